@@ -5,7 +5,7 @@ use super::{SEPARATORS, clauses};
 use crate::agent::language::CommandLanguage;
 use crate::agent::names::NameWords;
 use crate::agent::words::request_tokens;
-use crate::pipeline::semantics::query::language::words::Vocabulary;
+use crate::pipeline::semantics::query::language::words::LanguageWords;
 use crate::scene::Identities;
 
 /// Returns at most `most` completions of `text` by its next words: names of things first, else in the order of the
@@ -123,7 +123,7 @@ impl Kept<'_> {
             FormSlot::Turn => fixed(&["left", "right", "up", "down"]),
             FormSlot::Distance => fixed(&["20 cm", "half a meter", "two steps", "a bit"]),
             FormSlot::Angle => fixed(&["90 degrees", "45 degrees"]),
-            FormSlot::Most => Vocabulary::get().superlatives().map(str::to_owned).collect(),
+            FormSlot::Most => LanguageWords::get().superlatives().map(str::to_owned).collect(),
             FormSlot::Name => Vec::new(),
         }
     }
@@ -131,7 +131,7 @@ impl Kept<'_> {
 
 /// Words of all relations, sorted.
 fn relations() -> Vec<String> {
-    let mut all: Vec<String> = Vocabulary::get().relations().map(|(words, _)| words).collect();
+    let mut all: Vec<String> = LanguageWords::get().relations().map(|(words, _)| words).collect();
     all.sort();
     all
 }

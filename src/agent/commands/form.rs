@@ -10,7 +10,7 @@ use crate::agent::names::NameWords;
 use crate::agent::relation::Relation;
 use crate::agent::words::{Token, number};
 use crate::navigate::target::Side;
-use crate::pipeline::semantics::query::language::words::{Vocabulary, WordClass};
+use crate::pipeline::semantics::query::language::words::{LanguageWords, WordClass};
 use crate::scene::identity::whole_names::key;
 
 /// Kind of a slot.
@@ -209,7 +209,7 @@ impl FormRequest<'_> {
     fn take(&self, slot: FormSlot, at: usize, end: usize, slots: &mut Slots) -> bool {
         let words = &self.words[at..end];
         let text = words.join(" ");
-        let (language, vocabulary) = (CommandLanguage::get(), Vocabulary::get());
+        let (language, vocabulary) = (CommandLanguage::get(), LanguageWords::get());
         match slot {
             FormSlot::Thing => {
                 slots.named += words.len();

@@ -26,7 +26,7 @@ use super::words::{Token, alike, request_tokens};
 use super::world::World;
 use crate::navigate::target::Side;
 use crate::pipeline::semantics::query::language;
-use crate::pipeline::semantics::query::language::words::Vocabulary;
+use crate::pipeline::semantics::query::language::words::LanguageWords;
 use crate::scene::identity::name_words::words as name_words;
 use crate::scene::{Identities, LevelFilter};
 
@@ -353,7 +353,7 @@ pub(crate) fn nearest(request: &str, identities: &Identities) -> Vec<String> {
 fn corrected(request: &str, identities: &Identities) -> Option<String> {
     let known = NameWords::new(identities);
     let mut words: Vec<&str> = sequences().iter().flat_map(|s| &s.items).filter_map(FormItem::word).collect();
-    let relations: Vec<String> = Vocabulary::get().relations().map(|(words, _)| words).collect();
+    let relations: Vec<String> = LanguageWords::get().relations().map(|(words, _)| words).collect();
     words.extend(relations.iter().flat_map(|r| r.split(' ')));
     words.extend(known.words());
     words.sort_unstable();

@@ -37,6 +37,7 @@ const ALLOWED: [(&str, &str); 18] = [
     ("measure::turned", "settings with a knob turned"),
     ("navigate::camera_spline::steps_of", "frames of so many seconds"),
     ("pipeline::semantics::query::query_engine::ask_by_name", "names are compared in a scene that was opened"),
+    ("pipeline::semantics::query::language", "words are read by the names of a scene that was opened"),
     ("pipeline::semantics::query::matching", "the Gaussians of an answer"),
     ("pipeline::semantics::query::names", "names are compared in a scene that was opened"),
     ("pipeline::semantics::query::reading", "words are compared with the names in a scene that was opened"),

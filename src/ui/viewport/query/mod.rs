@@ -13,6 +13,7 @@ mod overlay;
 mod paint;
 pub(super) mod panel;
 mod pins;
+mod place;
 mod recipe;
 mod settings;
 mod side;
@@ -161,12 +162,6 @@ impl Queries {
             q.shown(&self.side().settings).into_iter().map(move |id| (id, Color32::from_rgb(r, g, b)))
         };
         self.all().flat_map(colored).collect()
-    }
-
-    /// Numbers of the things that the query in the field found together, from 1; none if it found one.
-    pub(super) fn numbers(&self) -> Vec<(IdentityId, usize)> {
-        let shown = self.side().live.as_ref().map(|q| q.shown(&self.side().settings)).unwrap_or_default();
-        if shown.len() < 2 { Vec::new() } else { shown.into_iter().zip(1..).collect() }
     }
 
     /// Identity maps of the current view, once drawn.
@@ -359,16 +354,6 @@ impl Queries {
     pub(crate) fn stand(&mut self, pose: Pose) {
         if self.true_mask.stand(pose) {
             self.forget_painted();
-        }
-    }
-
-    /// Sets the place from which the scene is asked, and answers again where left and right depend on it.
-    pub(crate) fn ask_from(&mut self, place: QueryPlace, semantics: &SemanticMap) {
-        if self.place != place {
-            self.place = place;
-            if self.sides.iter().flat_map(QuerySide::all).any(Asked::is_of_view) {
-                self.ask_again(semantics);
-            }
         }
     }
 

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use super::evaluate::{Evaluator, Outcome};
+use super::evaluator::{Evaluator, Outcome};
 use super::outcome::{Matches, Unmet, Why};
 use super::relations::HOLDS;
 use crate::pipeline::semantics::query::lexicon;
@@ -124,5 +124,5 @@ pub(super) fn described(
         });
         if either { each.fold(0.0, f64::max) } else { each.fold(1.0, f64::min) }
     };
-    Ok(super::conditions::judged(found, not, |m| sure(m.id)))
+    Ok(found.judged(not, |m| sure(m.id)))
 }

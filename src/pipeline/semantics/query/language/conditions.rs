@@ -2,16 +2,13 @@
 
 use std::ops::Range;
 
-use super::evaluate::{Evaluator, Outcome, is_of_view};
-use super::expression::{Condition, Expression, Order, Relation};
+use super::evaluator::{Evaluator, Outcome};
+use super::expression::{Condition, Expression, OrderBy, Relation};
 use super::outcome::{Matches, Member, Unmet, Why};
 use super::relations::{HOLDS, Space};
 use super::{adjectives, order};
 use crate::math::format;
 use crate::scene::IdentityId;
-
-/// Share under which a relation does not hold.
-const FAILS: f64 = 0.35;
 
 /// Members of a set for which a condition holds, or does not.
 pub(super) fn filtered(
@@ -61,7 +58,7 @@ pub(super) fn filtered(
                 // "The stick behind the body": the body of the same thing, if it has one.
                 let whole = identities.object_of(m.id);
                 let own = |a: &IdentityId| *a != whole && identities.object_of(*a) == whole;
-                let has_own = anchors[0].len() > 1 && anchors[0].iter().any(own);
+                let has_own = !by_parts && anchors[0].len() > 1 && anchors[0].iter().any(own);
                 let mut shares = anchors[0].iter().filter(|a| !has_own || own(a)).filter_map(|a| share(m, *a));
                 if all_of {
                     let least = shares.try_fold(1.0, |least: f64, s| Some(least.min(s)));
@@ -69,7 +66,7 @@ pub(super) fn filtered(
                 }
                 shares.fold(-1.0, f64::max)
             };
-            let kept = judged(found, not, |m| holds(m));
+            let kept = found.judged(not, |m| holds(m));
             // Without shapes, only the parts of things are known.
             match space {
                 Err(unmet) if not || kept.members.is_empty() => return Err(unmet),
@@ -86,7 +83,7 @@ pub(super) fn filtered(
             }
             unclear |= pairs.len() > 1;
             let holds = |m: &Member| pairs.iter().filter_map(|[a, b]| space.between(m.id, *a, *b)).fold(-1.0, f64::max);
-            judged(found, not, holds)
+            found.judged(not, holds)
         }
         Condition::Has(_) => {
             let identities = all.scene.identities;
@@ -103,7 +100,7 @@ pub(super) fn filtered(
                 let near = anchors[0].iter().filter(|p| **p != m.id).filter_map(|p| Some(lies(space?, *p, m)));
                 near.fold(0.0, f64::max)
             };
-            judged(found, not, has)
+            found.judged(not, has)
         }
         Condition::Compared { order, more, .. } => {
             unclear |= anchors[0].len() > 1 && !is_plural(is);
@@ -111,7 +108,7 @@ pub(super) fn filtered(
         }
         Condition::Measured { order, more, meters } => measured(all, found, (*order, *more != not, *meters), at)?,
         Condition::Within { near, meters, .. } => within(all, found, (*near, *meters), &anchors[0], not, at)?,
-        Condition::Among(_) => judged(found, not, |m| if anchors[0].contains(&m.id) { 1.0 } else { 0.0 }),
+        Condition::Among(_) => found.judged(not, |m| if anchors[0].contains(&m.id) { 1.0 } else { 0.0 }),
         Condition::Side { order, most } => order::on_side(all, found, (*order, *most != not), at)?,
     };
     let kept = Matches { unclear, ..kept };
@@ -119,7 +116,10 @@ pub(super) fn filtered(
     if kept.members.is_empty() {
         return Err(none_is(all, &before, &text, at));
     }
-    all.idle += usize::from(kept.members.len() == before.members.len());
+    let is_idle = kept.members.len() == before.members.len();
+    all.idle += usize::from(is_idle);
+    let is_measure = matches!(is, Condition::Compared { .. } | Condition::Measured { .. } | Condition::Within { .. });
+    all.idle_measure |= is_idle && is_measure;
     all.step(&tail(of, at), text, &kept);
     Ok(kept)
 }
@@ -140,6 +140,15 @@ fn tail(of: &Expression, at: &Range<usize>) -> Range<usize> {
         at.start..of.at.start
     } else {
         at.clone()
+    }
+}
+
+/// Returns whether a condition depends on the view.
+fn is_of_view(is: &Condition) -> bool {
+    match is {
+        Condition::Placed(relation, _) => relation.is_of_view(),
+        Condition::Compared { order, .. } | Condition::Side { order, .. } => OrderBy::is_of_view(*order),
+        _ => false,
     }
 }
 
@@ -169,18 +178,6 @@ fn anchors(all: &mut Evaluator<'_>, is: &Condition) -> Result<[Vec<IdentityId>; 
     })
 }
 
-/// Members for which a relation holds: sure ones alone if there are any, else those for which it may hold.
-pub(super) fn judged(found: Matches, not: bool, share: impl Fn(&Member) -> f64) -> Matches {
-    if not {
-        return found.kept(|m| Some(share(m)).filter(|s| *s < FAILS).map(|_| 1.0));
-    }
-    let found = found.kept(|m| Some(share(m)).filter(|s| *s >= HOLDS[1]));
-    if found.members.iter().any(|m| m.sure >= HOLDS[0]) {
-        return found.kept(|m| Some(m.sure).filter(|s| *s >= HOLDS[0]));
-    }
-    found
-}
-
 /// Members within a length of one of several things, or beyond it of all.
 fn within(
     all: &Evaluator<'_>,
@@ -204,7 +201,7 @@ fn within(
             HOLDS[1]
         }
     };
-    Ok(judged(found, not, share))
+    Ok(found.judged(not, share))
 }
 
 fn no_scale(all: &Evaluator<'_>, at: &Range<usize>) -> Unmet {
@@ -215,7 +212,7 @@ fn no_scale(all: &Evaluator<'_>, at: &Range<usize>) -> Unmet {
 fn measured(
     all: &Evaluator<'_>,
     found: Matches,
-    (order, more, meters): (Order, bool, f64),
+    (order, more, meters): (OrderBy, bool, f64),
     at: &Range<usize>,
 ) -> Outcome {
     let scale = all.scene.place.meters.filter(|m| *m > 0.0).ok_or_else(|| no_scale(all, at))?;

@@ -2,82 +2,14 @@
 
 use std::ops::Range;
 
-use super::expression::{Condition, Expression, Order, Relation, SetOf};
-use super::outcome::{Matches, Member, QueryStep, Unmet, Why};
+use super::evaluator::{Evaluator, Outcome};
+use super::expression::{Condition, Expression, Relation, SetOf};
+use super::outcome::{Matches, Member, Unmet, Why};
 use super::relations::{HOLDS, Space};
-use super::{Looks, QueryScene, conditions, nouns, order};
-use crate::scene::{IdentityId, LevelFilter};
+use super::{conditions, nouns, order};
+use crate::scene::IdentityId;
 
-pub(super) type Outcome = Result<Matches, Unmet>;
-
-/// Evaluator of the readings of one text.
-pub(super) struct Evaluator<'a> {
-    pub(super) scene: &'a QueryScene<'a>,
-    pub(super) space: Option<Space<'a>>,
-    pub(super) text: &'a str,
-    pub(super) looks: Option<&'a mut dyn Looks>,
-    pub(super) steps: Vec<QueryStep>,
-    /// Number of conditions that removed nothing.
-    pub(super) idle: usize,
-    /// True once the view decided.
-    pub(super) of_view: bool,
-    /// Remarks on the way, such as "a kettle is a kind of pot".
-    pub(super) notes: Vec<String>,
-    /// True once a match came from the encoder.
-    pub(super) looked: bool,
-    /// Thing that "one" stands for in a part of a sentence.
-    antecedent: Option<String>,
-    depth: usize,
-    /// True where the level that is asked for does not matter: in anchors and wholes.
-    any_level: bool,
-    /// True if "things" may be what most others stand on.
-    pub(super) with_stages: bool,
-}
-
-impl<'a> Evaluator<'a> {
-    pub(super) fn new(scene: &'a QueryScene<'a>, text: &'a str, looks: Option<&'a mut dyn Looks>) -> Self {
-        let space = scene.place.view.map(|view| Space::new(scene.identities, view));
-        let (steps, notes, looked, antecedent, depth, any_level) = (Vec::new(), Vec::new(), false, None, 0, false);
-        let (with_stages, idle, of_view) = (false, 0, false);
-        Self {
-            scene,
-            space,
-            text,
-            looks,
-            steps,
-            notes,
-            looked,
-            antecedent,
-            depth,
-            any_level,
-            with_stages,
-            idle,
-            of_view,
-        }
-    }
-
-    /// Text of some bytes.
-    pub(super) fn said(&self, at: &Range<usize>) -> &'a str {
-        self.text.get(at.clone()).unwrap_or_default()
-    }
-
-    pub(super) fn unmet(&self, why: Why, text: impl Into<String>, at: &Range<usize>) -> Unmet {
-        Unmet { why, text: text.into(), words: Vec::new(), near: Vec::new(), at: at.clone() }
-    }
-
-    /// Shapes and view, which relations and orders need.
-    pub(super) fn space(&self, at: &Range<usize>) -> Result<&Space<'a>, Unmet> {
-        let known = self.space.as_ref().filter(|s| s.shapes.are_known());
-        known.ok_or_else(|| self.unmet(Why::NotUnderstood, "Nothing is known here of where things are.", at))
-    }
-
-    /// Records a step.
-    pub(super) fn step(&mut self, at: &Range<usize>, text: impl Into<String>, found: &Matches) {
-        let left = found.settled();
-        let guess = left.iter().any(|m| m.sure < HOLDS[0]);
-        self.steps.push(QueryStep { at: at.clone(), text: text.into(), left: left.len(), guess, depth: self.depth });
-    }
-
+impl Evaluator<'_> {
     /// Evaluates an expression; an empty set is an error.
     pub(super) fn set(&mut self, e: &Expression) -> Outcome {
         let found = match &e.set {
@@ -155,14 +87,6 @@ impl<'a> Evaluator<'a> {
         Ok(found)
     }
 
-    /// Evaluates within an expression: its steps stand deeper.
-    pub(super) fn inner<T>(&mut self, run: impl FnOnce(&mut Self) -> T) -> T {
-        self.depth += 1;
-        let result = run(self);
-        self.depth -= 1;
-        result
-    }
-
     /// Evaluates the thing that others are compared with.
     pub(super) fn anchor(&mut self, e: &Expression) -> Outcome {
         let found = self.of_any_level(|s| s.inner(|s| s.set(e)))?;
@@ -213,20 +137,6 @@ impl<'a> Evaluator<'a> {
 
     fn anchor_or_all(&mut self, e: &Expression) -> Outcome {
         self.of_any_level(|s| s.inner(|s| s.set(e)))
-    }
-
-    /// Evaluates without regard to the level that is asked for.
-    pub(super) fn of_any_level<T>(&mut self, run: impl FnOnce(&mut Self) -> T) -> T {
-        let before = std::mem::replace(&mut self.any_level, true);
-        let result = run(self);
-        self.any_level = before;
-        result
-    }
-
-    /// Returns whether identities of a level may be matched here.
-    pub(super) fn accepts(&self, id: IdentityId) -> bool {
-        let level = if self.any_level { LevelFilter::Auto } else { self.scene.level };
-        self.scene.identities.get(id).is_some_and(|i| level.accepts(i.level)) && self.scene.is_there(id)
     }
 
     fn no_piece(&self, piece: &Expression, wholes: &[Member], unmet: Unmet, e: &Expression) -> Unmet {
@@ -307,20 +217,5 @@ impl<'a> Evaluator<'a> {
                 Ok(all)
             }
         }
-    }
-
-    /// Remark on a step that depends on the view.
-    pub(super) fn seen_from_here(&mut self, by_view: bool) -> &'static str {
-        self.of_view |= by_view;
-        if by_view { ", seen from here" } else { "" }
-    }
-}
-
-/// Returns whether a condition depends on the view.
-pub(super) fn is_of_view(is: &Condition) -> bool {
-    match is {
-        Condition::Placed(relation, _) => relation.is_of_view(),
-        Condition::Compared { order, .. } | Condition::Side { order, .. } => Order::is_of_view(*order),
-        _ => false,
     }
 }

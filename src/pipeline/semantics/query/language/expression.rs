@@ -82,7 +82,7 @@ impl Relation {
 /// Quantity by which things are compared.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub(crate) enum Order {
+pub(crate) enum OrderBy {
     /// Volume of the thing's own upright box.
     Size,
     /// Extent along the up direction of the scene.
@@ -103,7 +103,7 @@ pub(crate) enum Order {
     Lightness,
 }
 
-impl Order {
+impl OrderBy {
     /// Returns whether the order depends on the view.
     pub(crate) fn is_of_view(self) -> bool {
         matches!(self, Self::Right | Self::Distance)
@@ -155,7 +155,7 @@ pub(crate) enum SetOf {
     /// Those with the most or the least of a quantity: `count` of them, after the `first`.
     Ranked {
         of: Inner,
-        order: Order,
+        order: OrderBy,
         most: bool,
         first: usize,
         count: usize,
@@ -206,13 +206,13 @@ pub(crate) enum Condition {
     Has(Inner),
     /// More or less of a quantity than another thing.
     Compared {
-        order: Order,
+        order: OrderBy,
         more: bool,
         than: Inner,
     },
     /// More or less than a length in meters.
     Measured {
-        order: Order,
+        order: OrderBy,
         more: bool,
         meters: f64,
     },
@@ -226,7 +226,7 @@ pub(crate) enum Condition {
     Among(Inner),
     /// On one side of the middle of the picture: "the mugs on the left".
     Side {
-        order: Order,
+        order: OrderBy,
         most: bool,
     },
 }
@@ -249,7 +249,7 @@ pub(crate) enum Asks {
     /// Whether there are any, or whether something is so.
     Truth,
     Colors,
-    Size(Order),
+    Size(OrderBy),
 }
 
 impl Expression {

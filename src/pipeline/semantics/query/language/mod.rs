@@ -11,6 +11,7 @@
 pub(crate) mod adjectives;
 pub(crate) mod conditions;
 pub(crate) mod evaluate;
+pub(crate) mod evaluator;
 pub(crate) mod expression;
 pub(crate) mod grammar;
 pub(crate) mod nouns;
@@ -24,7 +25,7 @@ pub(crate) mod words;
 
 use glam::DVec3;
 
-use self::evaluate::Evaluator;
+use self::evaluator::Evaluator;
 use self::expression::{Asks, Expression, Sentence, SetOf};
 use self::outcome::{Matches, QueryStep, Unmet};
 use self::relations::Viewpoint;
@@ -111,6 +112,8 @@ pub(crate) struct Understood {
     pub(crate) of_view: bool,
     /// Number of conditions that removed nothing.
     idle: usize,
+    /// True if a comparison removed nothing.
+    idle_measure: bool,
     /// True if it joins several sets.
     is_union: bool,
 }
@@ -235,7 +238,7 @@ fn answer<'a>(
 ) -> Understood {
     let mut evaluator = Evaluator::new(scene, text, looks);
     let found = evaluator.set(&sentence.set);
-    let Evaluator { steps, notes, looked, idle, of_view, .. } = evaluator;
+    let Evaluator { steps, notes, looked, idle, idle_measure, of_view, .. } = evaluator;
     let plural = sentence.set.is_plural() || matches!(sentence.asks, Asks::Count | Asks::Names | Asks::Truth);
     let (found, unmet) = match found {
         Ok(found) => (found, None),
@@ -243,12 +246,28 @@ fn answer<'a>(
     };
     let is_union = matches!(sentence.set.set, SetOf::Union { .. });
     let (asks, said, readings) = (sentence.asks, None, 1);
-    Understood { found, plural, asks, steps, notes, said, unmet, by_looks: looked, readings, of_view, idle, is_union }
+    Understood {
+        found,
+        plural,
+        asks,
+        steps,
+        notes,
+        said,
+        unmet,
+        by_looks: looked,
+        readings,
+        of_view,
+        idle,
+        idle_measure,
+        is_union,
+    }
 }
 
 /// Chooses between the answers of two readings: one that finds a thing, and clearly; if both do and differ, both.
 fn better(old: Understood, new: Understood) -> Understood {
     let rank = |u: &Understood| match &u.unmet {
+        // "The box on the shelf taller than a meter" is said of the box.
+        None if u.idle_measure => 3,
         None if !u.is_ambiguous() => 0,
         None => 1,
         Some(unmet) => 2 + unmet.why as usize,

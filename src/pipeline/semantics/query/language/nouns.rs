@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 use super::adjectives::{self, Adjective};
-use super::evaluate::{Evaluator, Outcome};
+use super::evaluator::{Evaluator, Outcome};
 use super::outcome::{Matches, Member, Unmet, Why};
 use crate::models;
 use crate::pipeline::semantics::query::lexicon::{self, Kinship};

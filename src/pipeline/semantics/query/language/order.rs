@@ -2,9 +2,8 @@
 
 use std::ops::Range;
 
-use super::conditions::judged;
-use super::evaluate::{Evaluator, Outcome};
-use super::expression::Order;
+use super::evaluator::{Evaluator, Outcome};
+use super::expression::OrderBy;
 use super::outcome::{Matches, Member, Unmet, Why};
 use super::relations::Space;
 use crate::scene::{IdentityId, Level};
@@ -13,33 +12,35 @@ use crate::scene::{IdentityId, Level};
 const ALIKE: f64 = 0.03;
 
 /// Quantity of an identity; `None` if it cannot be measured.
-pub(super) fn value(all: &Evaluator<'_>, space: &Space<'_>, id: IdentityId, order: Order) -> Option<f64> {
+pub(super) fn value(all: &Evaluator<'_>, space: &Space<'_>, id: IdentityId, order: OrderBy) -> Option<f64> {
     let axes = space.axes();
     let shape = space.shapes.get(id)?;
     let extent = || space.shapes.extent(id, axes.up);
     Some(match order {
-        Order::Size => extent()?.volume(),
-        Order::Height => extent()?.height,
-        Order::Length => extent().map(|e| e.length.max(e.height))?,
-        Order::Width => extent()?.width,
-        Order::Thickness => extent().map(|e| e.width.min(e.height))?,
-        Order::Up => {
+        OrderBy::Size => extent()?.volume(),
+        OrderBy::Height => extent()?.height,
+        OrderBy::Length => extent().map(|e| e.length.max(e.height))?,
+        OrderBy::Width => extent()?.width,
+        OrderBy::Thickness => extent().map(|e| e.width.min(e.height))?,
+        OrderBy::Up => {
             let (low, high) = shape.span(axes.up);
             0.5 * (low + high)
         }
-        Order::Right => (shape.center() - space.view.eye).dot(axes.right),
-        Order::Distance => shape.center().distance(space.view.eye),
-        Order::Lightness => all.scene.identities.colors.lightness(id)?,
+        OrderBy::Right => (shape.center() - space.view.eye).dot(axes.right),
+        OrderBy::Distance => shape.center().distance(space.view.eye),
+        OrderBy::Lightness => all.scene.identities.colors.lightness(id)?,
     })
 }
 
 /// Difference under which two values of an order count as equal.
-fn slack(space: &Space<'_>, id: IdentityId, order: Order, value: f64) -> f64 {
+fn slack(space: &Space<'_>, id: IdentityId, order: OrderBy, value: f64) -> f64 {
     match order {
-        Order::Up | Order::Right | Order::Distance => 0.03 * space.shapes.get(id).map_or(0.0, |s| s.bounds.radius()),
-        Order::Lightness => 0.02,
+        OrderBy::Up | OrderBy::Right | OrderBy::Distance => {
+            0.03 * space.shapes.get(id).map_or(0.0, |s| s.bounds.radius())
+        }
+        OrderBy::Lightness => 0.02,
         // A volume has the errors of three lengths.
-        Order::Size => 4.0 * ALIKE * value.abs(),
+        OrderBy::Size => 4.0 * ALIKE * value.abs(),
         _ => ALIKE * value.abs(),
     }
 }
@@ -48,7 +49,7 @@ fn slack(space: &Space<'_>, id: IdentityId, order: Order, value: f64) -> f64 {
 pub(super) fn ranked(
     all: &mut Evaluator<'_>,
     found: Matches,
-    (order, most, superlative): (Order, bool, bool),
+    (order, most, superlative): (OrderBy, bool, bool),
     [first, count]: [usize; 2],
     at: &Range<usize>,
 ) -> Outcome {
@@ -156,7 +157,7 @@ pub(super) fn nearest(
 pub(super) fn compared(
     all: &Evaluator<'_>,
     found: Matches,
-    (order, more): (Order, bool),
+    (order, more): (OrderBy, bool),
     than: &[IdentityId],
     not: bool,
     at: &Range<usize>,
@@ -180,18 +181,23 @@ pub(super) fn compared(
         };
         than.iter().filter_map(over).fold(1.0, f64::min)
     };
-    let kept = judged(found, not, share);
+    let kept = found.judged(not, share);
     Ok(if not { kept.kept(|m| (!than.contains(&m.id)).then_some(m.sure)) } else { kept })
 }
 
 /// Members on one side of the middle of the picture, or of the others.
-pub(super) fn on_side(all: &Evaluator<'_>, found: Matches, (order, most): (Order, bool), at: &Range<usize>) -> Outcome {
+pub(super) fn on_side(
+    all: &Evaluator<'_>,
+    found: Matches,
+    (order, most): (OrderBy, bool),
+    at: &Range<usize>,
+) -> Outcome {
     let space = all.space(at)?;
     let of = |m: &Member| value(all, space, m.id, order);
     let mut values: Vec<f64> = found.members.iter().filter_map(of).collect();
     values.sort_by(f64::total_cmp);
     let middle = match (order, values.as_slice()) {
-        (Order::Right, _) => 0.0,
+        (OrderBy::Right, _) => 0.0,
         (_, []) => return Ok(Matches::default()),
         (_, values) => 0.5 * (values[0] + values[values.len() - 1]),
     };

@@ -2,6 +2,7 @@
 
 use std::ops::Range;
 
+use super::relations::HOLDS;
 use crate::scene::IdentityId;
 
 /// Identity in a set.
@@ -41,6 +42,23 @@ impl Matches {
     pub(crate) fn kept(self, mut sure: impl FnMut(&Member) -> Option<f64>) -> Self {
         let keep = |m: Member| sure(&m).map(|s| Member { sure: m.sure.min(s), ..m });
         Self { members: self.members.into_iter().filter_map(keep).collect(), ..self }
+    }
+}
+
+impl Matches {
+    /// Members for which a relation holds by its share: sure ones alone if there are any, else those for which it may
+    /// hold. With `not`, those for which it does not.
+    pub(super) fn judged(self, not: bool, share: impl Fn(&Member) -> f64) -> Self {
+        /// Share under which a relation does not hold.
+        const FAILS: f64 = 0.35;
+        if not {
+            return self.kept(|m| Some(share(m)).filter(|s| *s < FAILS).map(|_| 1.0));
+        }
+        let found = self.kept(|m| Some(share(m)).filter(|s| *s >= HOLDS[1]));
+        if found.members.iter().any(|m| m.sure >= HOLDS[0]) {
+            return found.kept(|m| Some(m.sure).filter(|s| *s >= HOLDS[0]));
+        }
+        found
     }
 }
 

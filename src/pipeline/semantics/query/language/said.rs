@@ -1,6 +1,6 @@
 //! Answers in words: counts, names, yes and no, colors and sizes.
 
-use super::expression::{Asks, Order};
+use super::expression::{Asks, OrderBy};
 use super::outcome::{Unmet, Why};
 use super::{QueryScene, Understood};
 use crate::math::format;
@@ -57,15 +57,15 @@ fn colors(scene: &QueryScene<'_>, ids: &[IdentityId]) -> String {
     ids.iter().take(MOST).map(of).collect::<Vec<_>>().join(" ")
 }
 
-fn sizes(scene: &QueryScene<'_>, ids: &[IdentityId], order: Order) -> String {
+fn sizes(scene: &QueryScene<'_>, ids: &[IdentityId], order: OrderBy) -> String {
     let up = scene.place.view.map_or(glam::DVec3::Z, |v| v.up);
     let of = |id: &IdentityId| {
         let name = capital(&scene.identities.full_name(*id));
         let Some(e) = scene.identities.shapes.extent(*id, up) else { return format!("{name}: not measured.") };
         let length = |units: f64| format::length(units, scene.place.meters);
         match order {
-            Order::Height => format!("{name}: {} high.", length(e.height)),
-            Order::Length => format!("{name}: {} x {} x {}.", length(e.length), length(e.width), length(e.height)),
+            OrderBy::Height => format!("{name}: {} high.", length(e.height)),
+            OrderBy::Length => format!("{name}: {} x {} x {}.", length(e.length), length(e.width), length(e.height)),
             _ => format!("{name}: {} wide.", length(e.width)),
         }
     };

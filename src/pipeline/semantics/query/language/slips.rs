@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use super::tokens::MAX_CHARS;
-use super::words::{Vocabulary, WordClass};
+use super::words::{LanguageWords, WordClass};
 use crate::models;
 use crate::pipeline::semantics::query::lexicon;
 use crate::scene::identity::name_words::{SceneWords, singular};
@@ -67,7 +67,7 @@ enum Slip {
 }
 
 fn slip(word: &str, known: &SceneWords) -> Slip {
-    let language = Vocabulary::get();
+    let language = LanguageWords::get();
     let letters = word.chars().count();
     if letters < SHORTEST || !word.chars().all(char::is_alphabetic) || known.has(word) {
         return Slip::None;

@@ -105,7 +105,7 @@ fn split_word(text: &str, at: Range<usize>, found: &mut Vec<Token>) {
     let low = body.to_lowercase().replace(['\u{2019}', '\u{2018}', '`'], "'");
     let here = start..marks;
     let owner = |end: &str| low.strip_suffix(end).filter(|o| !o.is_empty() && !o.starts_with('\''));
-    if let Some(words) = super::words::Vocabulary::get().same(&low) {
+    if let Some(words) = super::words::LanguageWords::get().same(&low) {
         words.split(' ').for_each(|w| push(found, w, here.clone()));
     } else if let Some((_, words)) = SHORT.iter().find(|(short, _)| *short == low) {
         words.iter().for_each(|w| push(found, w, here.clone()));

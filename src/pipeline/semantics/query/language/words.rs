@@ -5,7 +5,7 @@ use std::sync::OnceLock;
 
 use serde::Deserialize;
 
-use super::expression::{Order, Relation};
+use super::expression::{OrderBy, Relation};
 
 /// Contents of the file, which documents each list.
 #[derive(Debug, Default, Deserialize)]
@@ -23,10 +23,10 @@ struct WordLists {
     here: Vec<String>,
     openers: Vec<String>,
     relations: Vec<(String, Relation)>,
-    superlatives: Vec<(String, Order, bool)>,
-    comparatives: Vec<(String, Order, bool)>,
-    places: Vec<(String, Order, bool)>,
-    quantities: Vec<(String, Order)>,
+    superlatives: Vec<(String, OrderBy, bool)>,
+    comparatives: Vec<(String, OrderBy, bool)>,
+    places: Vec<(String, OrderBy, bool)>,
+    quantities: Vec<(String, OrderBy)>,
     units: Vec<(String, f64)>,
     no_name: String,
     same: Vec<(String, String)>,
@@ -49,7 +49,7 @@ pub(crate) enum WordClass {
 /// Choice of the one with the most or the least of a quantity.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct OrderWord {
-    pub(crate) order: Order,
+    pub(crate) order: OrderBy,
     /// True for the most of it.
     pub(crate) most: bool,
     /// True if it chooses among any number of things, false if among two.
@@ -58,15 +58,15 @@ pub(crate) struct OrderWord {
 
 /// Words of the language, by their first word.
 #[derive(Debug, Default)]
-pub(crate) struct Vocabulary {
+pub(crate) struct LanguageWords {
     classes: HashMap<String, Vec<WordClass>>,
     except: Phrases<()>,
     here: Phrases<()>,
     openers: Phrases<()>,
     relations: Phrases<Relation>,
-    places: Phrases<(Order, bool)>,
+    places: Phrases<(OrderBy, bool)>,
     orders: HashMap<String, OrderWord>,
-    quantities: HashMap<String, Order>,
+    quantities: HashMap<String, OrderBy>,
     units: HashMap<String, f64>,
     same: HashMap<String, String>,
 }
@@ -91,10 +91,10 @@ fn begins<'l, T>(all: &'l Phrases<T>, words: &[&str]) -> Option<(&'l T, usize)> 
     found.map(|(phrase, value)| (value, phrase.len())).max_by_key(|(_, n)| *n)
 }
 
-impl Vocabulary {
+impl LanguageWords {
     /// Returns the built-in words. A test reads them, so the fallback to none is never used.
     pub(crate) fn get() -> &'static Self {
-        static READ: OnceLock<Vocabulary> = OnceLock::new();
+        static READ: OnceLock<LanguageWords> = OnceLock::new();
         READ.get_or_init(|| Self::read().unwrap_or_default())
     }
 
@@ -160,7 +160,7 @@ impl Vocabulary {
     }
 
     /// Place at the start that is said without another thing, and its number of words.
-    pub(crate) fn place(&self, words: &[&str]) -> Option<((Order, bool), usize)> {
+    pub(crate) fn place(&self, words: &[&str]) -> Option<((OrderBy, bool), usize)> {
         begins(&self.places, words).map(|(place, n)| (*place, n))
     }
 
@@ -180,7 +180,7 @@ impl Vocabulary {
     }
 
     /// Quantity that an adjective or noun names.
-    pub(crate) fn quantity(&self, word: &str) -> Option<Order> {
+    pub(crate) fn quantity(&self, word: &str) -> Option<OrderBy> {
         self.quantities.get(word).copied()
     }
 
@@ -207,17 +207,17 @@ mod tests {
 
     #[test]
     fn the_longest_phrase_counts() {
-        let words = Vocabulary::read().expect("the words");
+        let words = LanguageWords::read().expect("the words");
         assert_eq!(words.relation(&["on", "top", "of", "it"]), Some((Relation::On, 3)));
         assert_eq!(words.relation(&["on", "the", "left", "of", "it"]), Some((Relation::LeftOf, 4)));
-        assert_eq!(words.place(&["on", "the", "left"]), Some(((Order::Right, false), 3)));
+        assert_eq!(words.place(&["on", "the", "left"]), Some(((OrderBy::Right, false), 3)));
         let [tallest, taller] = ["tallest", "taller"].map(|w| words.order(w).expect("an order"));
         assert!(tallest.superlative && !taller.superlative && tallest.order == taller.order && taller.most);
         assert!(words.is(WordClass::NoName, "and") && !words.is(WordClass::NoName, "lamp"));
         assert!(words.relation(&["lamp"]).is_none() && words.except(&["but", "not", "it"]) == Some(2));
         assert_eq!(
             (words.unit("cm"), words.quantity("tall"), words.opener(&["show", "me", "it"])),
-            (Some(0.01), Some(Order::Height), Some(2))
+            (Some(0.01), Some(OrderBy::Height), Some(2))
         );
     }
 }

@@ -1,8 +1,8 @@
 //! Words after a noun: "left of the lamp", "with a handle", "that are not red", "over 20 cm tall".
 
 use super::Grammar;
-use crate::pipeline::semantics::query::language::expression::{Condition, Expression, Order, Relation, SetOf};
-use crate::pipeline::semantics::query::language::tokens::number;
+use super::lengths::{is_eye, length, said_at_length};
+use crate::pipeline::semantics::query::language::expression::{Condition, Expression, OrderBy, Relation, SetOf};
 use crate::pipeline::semantics::query::language::words::WordClass;
 use crate::scene::colors;
 
@@ -130,7 +130,8 @@ pub(super) fn after(
     }
     found.append(&mut close);
     if let Some(((order, most), n)) = g.vocabulary.place(&rest).filter(|(_, n)| rest.get(*n) != Some(&"of")) {
-        let set = if noun.is_plural() || not {
+        let is_most = matches!(rest[0], "furthest" | "farthest" | "most" | "of" | "with");
+        let set = if !is_most && noun.is_plural() || not {
             SetOf::Where { of: Box::new(noun.clone()), is: Condition::Side { order, most }, not }
         } else {
             SetOf::Ranked { of: Box::new(noun.clone()), order, most, first: 0, count: 1, superlative: true }
@@ -207,7 +208,7 @@ fn having<'a>(g: &mut Grammar<'a>, from: usize, j: usize, not: bool, add: &mut A
 fn nearest_to_eye(noun: &Expression, far: bool) -> SetOf {
     SetOf::Ranked {
         of: Box::new(noun.clone()),
-        order: Order::Distance,
+        order: OrderBy::Distance,
         most: far,
         first: 0,
         count: 1,
@@ -231,7 +232,7 @@ fn compared(g: &mut Grammar<'_>, noun: &Expression, [i, at, j]: [usize; 3], not:
         return found;
     }
     let choice = g.vocabulary.order(g.words[from]);
-    if let Some(choice) = choice.filter(|c| c.order == Order::Distance && !not) {
+    if let Some(choice) = choice.filter(|c| c.order == OrderBy::Distance && !not) {
         let to = if matches!(g.words.get(from + 1), Some(&("to" | "from"))) { from + 2 } else { from + 1 };
         let far = choice.most;
         let to = if g.words.get(from + 1) == Some(&"away") && g.words.get(from + 2) == Some(&"from") {
@@ -303,53 +304,11 @@ fn compared(g: &mut Grammar<'_>, noun: &Expression, [i, at, j]: [usize; 3], not:
         let to = if g.words.get(end) == Some(&"in") && end + 1 < j { end + 1 } else { end };
         let (order, end) = match g.words.get(to).and_then(|w| g.vocabulary.quantity(w)) {
             Some(order) if to < j => (order, to + 1),
-            _ => (Order::Length, end),
+            _ => (OrderBy::Length, end),
         };
         add(g, Condition::Measured { order, more, meters }, not, end);
     }
     found
-}
-
-/// Reads "of greater size than", "less tall than": the quantity, whether more of it, and the number of words.
-fn said_at_length(g: &Grammar<'_>, from: usize, j: usize) -> Option<(Order, bool, usize)> {
-    let words = &g.words[from..j];
-    let skip = usize::from(matches!(words.first(), Some(&("of" | "with"))));
-    let (more, quantity) = match words.get(skip..)? {
-        ["greater" | "more" | "larger", quantity, "than", ..] => (true, quantity),
-        ["smaller" | "less" | "lesser", quantity, "than", ..] => (false, quantity),
-        _ => return None,
-    };
-    let order = g.vocabulary.quantity(quantity)?;
-    Some((if *quantity == "size" { Order::Size } else { order }, more, skip + 3))
-}
-
-/// Number of words at the start that mean the camera.
-fn is_eye(g: &Grammar<'_>, words: &[&str]) -> Option<usize> {
-    match words {
-        // A thing of this name comes first.
-        ["the", "camera" | "viewer" | "eye", ..] | ["camera" | "viewer", ..]
-            if words.iter().take(2).any(|w| g.known.ends(w)) =>
-        {
-            None
-        }
-        ["me" | "us" | "here", ..] => Some(1),
-        ["the", "camera" | "viewer" | "eye", ..] | ["my", "eye", ..] => Some(2),
-        ["camera" | "viewer"] => Some(1),
-        _ => None,
-    }
-}
-
-/// Reads a length, in meters: "20 cm", "half a meter".
-fn length(g: &Grammar<'_>, from: usize, j: usize) -> Option<(f64, usize)> {
-    let words = g.words.get(from..j)?;
-    let (amount, n) = match words {
-        ["half", "a" | "an", ..] => (0.5, 2),
-        ["a" | "an" | "one", ..] => (1.0, 1),
-        [first, ..] => (number(first)?, 1),
-        [] => return None,
-    };
-    let unit = g.vocabulary.unit(words.get(n)?)?;
-    Some((amount * unit, from + n + 1)).filter(|(meters, _)| meters.is_finite() && *meters >= 0.0)
 }
 
 /// Reads what is said of a thing after "is": a color, an order, another set.

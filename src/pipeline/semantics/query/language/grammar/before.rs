@@ -3,7 +3,7 @@
 use super::Grammar;
 use super::after::after;
 use super::noun::{is_plural, noun};
-use crate::pipeline::semantics::query::language::expression::{Condition, Expression, Order, SetOf};
+use crate::pipeline::semantics::query::language::expression::{Condition, Expression, OrderBy, SetOf};
 use crate::pipeline::semantics::query::language::tokens::{number, ordinal};
 use crate::pipeline::semantics::query::language::words::WordClass;
 use crate::scene::colors;
@@ -158,7 +158,8 @@ fn quantified(g: &mut Grammar<'_>, i: usize, j: usize) -> Vec<Expression> {
     }
     let amount = singular(word);
     let is_part = g.vocabulary.is(WordClass::Part, &amount) && is_of_the(g, i);
-    if g.vocabulary.is(WordClass::Amount, &amount) && g.words.get(i + 1) == Some(&"of") && i + 2 < j && !is_part {
+    let is_amount = g.vocabulary.is(WordClass::Amount, &amount) && amount != "one";
+    if is_amount && g.words.get(i + 1) == Some(&"of") && i + 2 < j && !is_part {
         let two = matches!(amount.as_str(), "pair" | "couple");
         return match (two, is_plural(word)) {
             (true, _) => wrap(g, i + 2, &|of| SetOf::Counted { of, count: 2 }),
@@ -234,7 +235,7 @@ fn ranked(g: &mut Grammar<'_>, i: usize, j: usize) -> Vec<Expression> {
     if matches!(g.words.get(from), Some(&("of" | "among" | "amongst"))) {
         from += 1;
     }
-    if choice.order == Order::Distance && from < j {
+    if choice.order == OrderBy::Distance && from < j {
         // "The nearest mug to the lamp".
         if g.words.get(from) == Some(&"to") {
             return Vec::new();
@@ -250,7 +251,7 @@ fn ranked(g: &mut Grammar<'_>, i: usize, j: usize) -> Vec<Expression> {
             let first = first.saturating_sub(1);
             let order = |of| SetOf::Ranked {
                 of: Box::new(of),
-                order: Order::Distance,
+                order: OrderBy::Distance,
                 most: far,
                 first,
                 count,
@@ -293,12 +294,12 @@ fn from_a_side(g: &mut Grammar<'_>, nth: usize, from: usize, i: usize, j: usize)
     let found = (from + 1..j.saturating_sub(2)).find(|p| matches!(g.words[*p..*p + 2], ["from", "the"]));
     let Some(at) = found else { return Vec::new() };
     let (order, most) = match g.words[at + 2] {
-        "left" => (Order::Right, false),
-        "right" => (Order::Right, true),
-        "top" => (Order::Up, true),
-        "bottom" => (Order::Up, false),
-        "front" => (Order::Distance, false),
-        "back" => (Order::Distance, true),
+        "left" => (OrderBy::Right, false),
+        "right" => (OrderBy::Right, true),
+        "top" => (OrderBy::Up, true),
+        "bottom" => (OrderBy::Up, false),
+        "front" => (OrderBy::Distance, false),
+        "back" => (OrderBy::Distance, true),
         _ => return Vec::new(),
     };
     let (most, first) = if nth == 0 { (!most, 0) } else { (most, nth - 1) };

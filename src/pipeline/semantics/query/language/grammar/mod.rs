@@ -5,6 +5,7 @@
 
 mod after;
 mod before;
+mod lengths;
 mod noun;
 mod sentence;
 
@@ -15,7 +16,7 @@ use std::rc::Rc;
 pub(crate) use self::sentence::sentences;
 use super::expression::{Expression, SetOf};
 use super::tokens::{Token, is_mark};
-use super::words::{Vocabulary, WordClass};
+use super::words::{LanguageWords, WordClass};
 use crate::scene::identity::name_words::{SceneWords, singular};
 use crate::scene::{Identities, LevelFilter};
 
@@ -33,7 +34,7 @@ pub(crate) struct Grammar<'a> {
     words: Vec<&'a str>,
     identities: &'a Identities,
     known: &'a SceneWords,
-    vocabulary: &'static Vocabulary,
+    vocabulary: &'static LanguageWords,
     /// Readings by the first word and the one after the last.
     read: HashMap<(usize, usize, bool), Rc<Vec<Expression>>>,
 }
@@ -42,7 +43,7 @@ impl<'a> Grammar<'a> {
     pub(crate) fn new(text: &'a str, tokens: Vec<&'a Token>, identities: &'a Identities) -> Self {
         let comma = |low: &'a str| if is_mark(low) && low != "?" { "," } else { low };
         let words = tokens.iter().map(|t| comma(t.low.as_str())).collect();
-        let (known, vocabulary) = (identities.words(), Vocabulary::get());
+        let (known, vocabulary) = (identities.words(), LanguageWords::get());
         Self { text, tokens, words, identities, known, vocabulary, read: HashMap::new() }
     }
 

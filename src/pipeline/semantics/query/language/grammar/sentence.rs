@@ -1,9 +1,9 @@
 //! Forms of sentences: what is asked of a set, "how many", "is there", "which is taller".
 
 use super::Grammar;
-use crate::pipeline::semantics::query::language::expression::{Asks, Expression, Order, Sentence, SetOf};
+use crate::pipeline::semantics::query::language::expression::{Asks, Expression, OrderBy, Sentence, SetOf};
 use crate::pipeline::semantics::query::language::tokens::{Token, is_mark};
-use crate::pipeline::semantics::query::language::words::Vocabulary;
+use crate::pipeline::semantics::query::language::words::LanguageWords;
 use crate::scene::identity::name_words::singular;
 use crate::scene::{Identities, LevelFilter};
 
@@ -30,7 +30,7 @@ pub(crate) fn sentences(text: &str, tokens: &[Token], identities: &Identities) -
         if let ["can" | "could" | "do", "you" | "we" | "i", "see" | "find", ..] = words.as_slice() {
             break;
         }
-        match Vocabulary::get().opener(&words).or((words.first() == Some(&",")).then_some(1)) {
+        match LanguageWords::get().opener(&words).or((words.first() == Some(&",")).then_some(1)) {
             Some(n) if n < bare.len() && is_name() => bare = &bare[n..],
             _ => break,
         }
@@ -87,7 +87,7 @@ impl<'a> SentenceReader<'a> {
                 }
             }
             ["what", "is" | "are", "the", quantity, "of", ..] if self.whole.vocabulary.quantity(quantity).is_some() => {
-                let order = self.whole.vocabulary.quantity(quantity).unwrap_or(Order::Length);
+                let order = self.whole.vocabulary.quantity(quantity).unwrap_or(OrderBy::Length);
                 self.plain(Asks::Size(order), 5, n);
             }
             ["what" | "which", "can", "be", "found" | "seen", ..] if n > 4 => self.said_of_anything(4),
@@ -176,7 +176,14 @@ impl<'a> SentenceReader<'a> {
         let tokens = self.whole.tokens[1..].to_vec();
         let at = self.whole.words.iter().skip(1).position(|w| matches!(*w, "have" | "contain"));
         let Some(at) = at.filter(|at| *at > 0) else { return };
-        self.truth(tokens, at);
+        // The piece is the answer.
+        let (whole, piece) =
+            (self.whole.of(tokens[..at].to_vec()).all(), self.whole.of(tokens[at + 1..].to_vec()).all());
+        for (piece, whole) in super::pairs(&piece, &whole) {
+            let at = whole.at.start..piece.at.end;
+            let set = Expression::new(SetOf::PartOf(Box::new(piece), Box::new(whole)), at);
+            self.found.push(Sentence { asks: Asks::Truth, set });
+        }
     }
 
     /// Reads "is the mug left of the kettle": any division into a thing and what is said of it.
