@@ -117,6 +117,7 @@ fn print_answer(args: &QueryArgs, text: &str, map: &SemanticMap, result: &QueryR
         output::print(&lines.join("\n"))?;
     }
     let answer = &answered.answer;
+    let understood = answered.understood.as_ref();
     let hits = answer.hits();
     let is_empty = hits.first().is_some_and(|hit| map.members(hit.identity).is_empty());
     if args.json {
@@ -132,6 +133,9 @@ fn print_answer(args: &QueryArgs, text: &str, map: &SemanticMap, result: &QueryR
             "pixels": mask.area(),
             "in_view": !mask.is_empty(),
             "empty": is_empty,
+            "said": understood.and_then(|u| u.said.as_ref()),
+            "notes": understood.map(|u| &u.notes),
+            "reason": understood.and_then(|u| u.unmet.as_ref()).map(|u| &u.text),
             "unknown_words": unexplained_words,
             "ignored_words": ignored,
             "mended": reading.mended.iter().map(|(typed, read)| json!({ "typed": typed, "read": read })).collect::<Vec<_>>(),
@@ -154,14 +158,18 @@ fn print_answer(args: &QueryArgs, text: &str, map: &SemanticMap, result: &QueryR
             let near = offer("nearest", slips.chain(by_name.into_iter().map(name)).collect());
             let looks = offer("looks most like", by_looks.into_iter().map(name).collect());
             let words = offer("words that nothing here fits", unexplained_words.clone());
-            Err(CliError::failed(format!("no match for '{text}'{words}{near}{looks}")))
+            let why = understood.and_then(|u| u.said.as_ref().or(u.unmet.as_ref().map(|unmet| &unmet.text)));
+            let why = why.map(|why| format!(". {why}")).unwrap_or_default();
+            Err(CliError::failed(format!("no match for '{text}'{words}{near}{looks}{why}")))
         }
         _ if args.json => Ok(()),
         _ => {
             let mut rows = vec![vec!["answer".to_owned(), "score".to_owned(), "margin".to_owned()]];
             rows.extend(hits.iter().map(|h| vec![full_name(h), format!("{:.3}", h.score), format!("{:.3}", h.margin)]));
             let ambiguous = matches!(answer, Answer::Ambiguous(_));
-            let note = if ambiguous { " (ambiguous: the first two fit alike)" } else { "" };
+            let note = if ambiguous { " (ambiguous: they fit alike)" } else { "" };
+            let said = understood.into_iter().flat_map(|u| u.said.iter().chain(&u.notes));
+            let said: String = said.map(|line| format!("{line}\n")).collect();
             let seen = match mask.area() {
                 0 if is_empty => "empty: no Gaussians belong to it".to_owned(),
                 0 => "not in this view (--camera looks from another photo)".to_owned(),
@@ -170,7 +178,9 @@ fn print_answer(args: &QueryArgs, text: &str, map: &SemanticMap, result: &QueryR
             let mended = mended_text(&reading.mended).map(|t| format!("\n{t}")).unwrap_or_default();
             let ignored = if ignored.is_empty() { String::new() } else { format!("\nignored: {}", ignored.join(", ")) };
             let table = output::table(&rows);
-            output::print(&format!("{table}\n{seen}, answered by {basis} in {query_ms:.2} ms{note}{mended}{ignored}"))
+            output::print(&format!(
+                "{said}{table}\n{seen}, answered by {basis} in {query_ms:.2} ms{note}{mended}{ignored}"
+            ))
         }
     }
 }

@@ -23,7 +23,7 @@ const AT_WORK: [&str; 10] = [
 ];
 
 /// Exceptions that front ends may name: paths or beginnings of paths.
-const ALLOWED: [(&str, &str); 18] = [
+const ALLOWED: [(&str, &str); 19] = [
     ("io::files::read", "a file of settings: the agent's policy"),
     ("io::http", "the way to a chat model is the agent's own"),
     ("measure::axis::ticks", "how reports are drawn"),
