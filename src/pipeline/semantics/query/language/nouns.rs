@@ -261,6 +261,12 @@ fn not_there(all: &Evaluator<'_>, words: &[String], at: &Range<usize>) -> Unmet 
         .copied()
         .filter(|id| all.accepts(*id) && known.names(*id).iter().any(|n| is_head(n, head)));
     let heads: Vec<IdentityId> = heads.take(6).collect();
+    // "Red controller wheel": the whole is there, and lacks such a piece.
+    let wholes: Vec<IdentityId> = if rest.is_empty() { Vec::new() } else { by_heads(all, rest).ids() };
+    if let Some(whole) = wholes.first() {
+        let text = format!("The {} has no \u{201c}{head}\u{201d} here.", identities.full_name(*whole));
+        return Unmet { why: Why::Unknown, text, words: vec![head.clone()], near: wholes, at: at.clone() };
+    }
     if !heads.is_empty() {
         // The thing is there, but not so.
         let beside = |id: &IdentityId| adjectives::undescribed(all, *id, rest, head);
