@@ -2,21 +2,12 @@
 
 use super::relation::Relation;
 use super::world::World;
-use crate::math::format::{self, short};
+use crate::math::format::{self, capital, short};
 use crate::pipeline::semantics::query::language::relations::{HOLDS, Space};
 use crate::scene::{IdentityId, Level, NO_IDENTITY};
 
 /// Least share of the view for a thing to count as visible.
 pub(crate) const SEEN: f64 = 0.0005;
-
-/// Joins items to "a, b and c".
-pub(crate) fn join(items: &[String]) -> String {
-    match items {
-        [] => String::new(),
-        [one] => one.clone(),
-        [start @ .., last] => format!("{} and {last}", start.join(", ")),
-    }
-}
 
 /// Name with an article, such as "the kettle", or "#7" for an identity without a name.
 pub(crate) fn the(world: &dyn World, id: IdentityId) -> String {
@@ -30,7 +21,7 @@ pub(crate) fn names(world: &dyn World, ids: &[IdentityId], most: usize) -> Strin
     if ids.len() > most {
         list.push(format!("{} more", ids.len() - most));
     }
-    join(&list)
+    format::list(&list)
 }
 
 /// Formats a length given in scene units.
@@ -87,7 +78,7 @@ pub(crate) fn place(world: &dyn World, id: IdentityId) -> String {
         let next = neighbors(world, object, relation).into_iter().find(near);
         said.extend(next.map(|id| format!("{words} {}", the(world, id))));
     }
-    join(&said)
+    format::list(&said)
 }
 
 /// Returns whether a thing is beside another and not rather behind or above it.
@@ -130,7 +121,7 @@ pub(crate) fn thing(world: &dyn World, id: IdentityId) -> String {
         text += " It is not in view.";
     }
     if facts.names.len() > 1 {
-        text += &format!(" It is also called {}.", join(&facts.names[1..]));
+        text += &format!(" It is also called {}.", format::list(&facts.names[1..]));
     }
     text
 }
@@ -157,10 +148,4 @@ pub(crate) fn view(world: &dyn World) -> String {
             format!("You are looking at {}; also in view: {}.", the(world, *most), names(world, rest, 12))
         }
     }
-}
-
-/// Makes the first letter a capital.
-pub(crate) fn capital(text: &str) -> String {
-    let mut letters = text.chars();
-    letters.next().map_or_else(String::new, |c| c.to_uppercase().chain(letters).collect())
 }

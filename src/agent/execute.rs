@@ -2,7 +2,7 @@
 //! [`World`] acts. The calls of every planner pass here, and only here.
 
 use super::camera_args::{Distance, NORMAL};
-use super::describe::{self, SEEN, capital, length, the};
+use super::describe::{self, SEEN, length, the};
 use super::dialog::DialogState;
 use super::listing::{list_ids, measure, say_list};
 use super::policy::{Permission, Policy};
@@ -10,6 +10,7 @@ use super::refusal::{Refusal, RefusalKind};
 use super::resolve::{Resolved, resolve};
 use super::tool::{Reference, Target, ToolCall};
 use super::world::{Unreachable, World, WorldError};
+use crate::math::format::capital;
 use crate::navigate::target::Side;
 use crate::scene::{IdentityId, LevelFilter, NO_IDENTITY};
 

@@ -1,12 +1,13 @@
 //! Lists, counts and measurements, in words.
 
-use super::describe::{self, capital, length, the};
+use super::describe::{self, length, the};
 use super::dialog::DialogState;
 use super::refusal::{Refusal, RefusalKind};
 use super::relation::Relation;
 use super::resolve::resolve_all;
 use super::tool::Reference;
 use super::world::World;
+use crate::math::format::capital;
 use crate::pipeline::semantics::query::language::relations::HOLDS;
 use crate::scene::{IdentityId, LevelFilter, NO_IDENTITY};
 

@@ -23,6 +23,20 @@ pub(crate) fn things(n: usize, what: &str) -> String {
     format!("{} {what}{}", count(n as u64), if n == 1 { "" } else { "s" })
 }
 
+/// Items of a list in a sentence: "a, b and c".
+pub(crate) fn list(items: &[String]) -> String {
+    match items {
+        [start @ .., last] if !start.is_empty() => format!("{} and {last}", start.join(", ")),
+        _ => items.concat(),
+    }
+}
+
+/// Text with a capital as its first letter.
+pub(crate) fn capital(text: &str) -> String {
+    let mut letters = text.chars();
+    letters.next().map_or_else(String::new, |c| c.to_uppercase().chain(letters).collect())
+}
+
 /// Bytes in decimal units: "12 MB".
 pub(crate) fn bytes(n: u64) -> String {
     match n {

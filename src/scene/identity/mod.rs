@@ -232,6 +232,16 @@ impl Identities {
         std::iter::successors(known(id), move |&at| self.get(at).and_then(|i| known(i.parent)).filter(|p| *p < at))
     }
 
+    /// Returns whether `id` is a piece of `whole`, directly or not; nothing is a piece of itself.
+    pub(crate) fn is_piece(&self, id: IdentityId, whole: IdentityId) -> bool {
+        self.ancestors(id).skip(1).any(|i| i == whole)
+    }
+
+    /// Returns whether two identities are the same, or one is a piece of the other.
+    pub(crate) fn are_related(&self, a: IdentityId, b: IdentityId) -> bool {
+        a == b || self.is_piece(a, b) || self.is_piece(b, a)
+    }
+
     pub(crate) fn object_of(&self, id: IdentityId) -> IdentityId {
         self.ancestors(id).last().unwrap_or(NO_IDENTITY)
     }

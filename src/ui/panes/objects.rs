@@ -148,7 +148,7 @@ impl Tree<'_> {
             return;
         }
         let mut state = CollapsingState::load_with_default_open(ui.ctx(), Id::unique("branch").with(id), false);
-        let is_within = |piece: IdentityId| self.identities.ancestors(piece).skip(1).any(|whole| whole == id);
+        let is_within = |piece: IdentityId| self.identities.is_piece(piece, id);
         let renamed = self.renaming.as_ref().filter(|r| r.frames == 0).map(|r| r.id);
         if renamed.into_iter().chain(self.scroll_to).any(is_within) {
             state.set_open(true);

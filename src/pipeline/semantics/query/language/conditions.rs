@@ -8,6 +8,7 @@ use super::outcome::{Matches, Member, Unmet, Why};
 use super::relations::{HOLDS, Space};
 use super::{adjectives, order};
 use crate::math::format;
+use crate::pipeline::semantics::query::lexicon;
 use crate::scene::IdentityId;
 
 /// Members of a set for which a condition holds, or does not.
@@ -29,11 +30,9 @@ pub(super) fn filtered(
             let several = !anchor.is_plural() && anchors[0].len() > 1;
             let all_of = anchor.is_plural() && relation.is_of_view();
             let identities = all.scene.identities;
-            let is_piece =
-                |id: IdentityId, whole: IdentityId| id != whole && identities.ancestors(id).any(|i| i == whole);
             let by_parts = matches!(relation, Relation::On | Relation::In | Relation::PartOf);
             let share = |m: &Member, a: IdentityId| match &space {
-                _ if by_parts && is_piece(m.id, a) => Some(1.0),
+                _ if by_parts && identities.is_piece(m.id, a) => Some(1.0),
                 Ok(space) => space.share(*relation, m.id, a),
                 Err(_) => None,
             };
@@ -93,8 +92,7 @@ pub(super) fn filtered(
                 share(Relation::In).max(share(Relation::On))
             };
             let has = |m: &Member| {
-                let is_piece = |p: &IdentityId| *p != m.id && identities.ancestors(*p).any(|i| i == m.id);
-                if anchors[0].iter().any(is_piece) {
+                if anchors[0].iter().any(|p| identities.is_piece(*p, m.id)) {
                     return 1.0;
                 }
                 let near = anchors[0].iter().filter(|p| **p != m.id).filter_map(|p| Some(lies(space?, *p, m)));
@@ -130,11 +128,7 @@ fn is_plural(is: &Condition) -> bool {
 
 /// Bytes of a condition: what stands after the things that it is said of.
 fn tail(of: &Expression, at: &Range<usize>) -> Range<usize> {
-    if of.at.end > of.at.start
-        && of.at.end < at.end
-        && of.at.start <= at.start.max(of.at.start)
-        && of.at.end >= at.start
-    {
+    if !of.at.is_empty() && of.at.end < at.end && of.at.end >= at.start {
         of.at.end..at.end
     } else if at.start < of.at.start {
         at.start..of.at.start
@@ -160,16 +154,14 @@ fn ids(all: &mut Evaluator<'_>, e: &Expression) -> Result<Vec<IdentityId>, Unmet
 fn anchors(all: &mut Evaluator<'_>, is: &Condition) -> Result<[Vec<IdentityId>; 2], Unmet> {
     Ok(match is {
         // The exact "bowl" may be a piece of the bowl that is meant.
-        Condition::Placed(Relation::In, anchor) => {
-            [all.of_any_level(|all| all.inner(|all| all.set(anchor)))?.ids(), Vec::new()]
-        }
+        Condition::Placed(Relation::In, anchor) => [all.anchor_or_all(anchor)?.ids(), Vec::new()],
         Condition::Placed(_, anchor) | Condition::Among(anchor) => [ids(all, anchor)?, Vec::new()],
         Condition::Compared { than: of, .. } | Condition::Within { of, .. } => [ids(all, of)?, Vec::new()],
         Condition::Between(a, b) => [ids(all, a)?, ids(all, b)?],
         Condition::Has(piece) => match ids(all, piece) {
             Ok(pieces) => [pieces, Vec::new()],
             // "A mug without a straw": nothing here has one, if that is a thing at all.
-            Err(unmet) if unmet.why <= Why::Unknown && unmet.words.iter().all(|w| super::is_a_thing(w)) => {
+            Err(unmet) if unmet.why <= Why::Unknown && unmet.words.iter().all(|w| lexicon::is_noun(w)) => {
                 [Vec::new(), Vec::new()]
             }
             Err(unmet) => return Err(unmet),

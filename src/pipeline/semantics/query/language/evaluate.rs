@@ -89,35 +89,36 @@ impl Evaluator<'_> {
 
     /// Evaluates the thing that others are compared with.
     pub(super) fn anchor(&mut self, e: &Expression) -> Outcome {
-        let found = self.of_any_level(|s| s.inner(|s| s.set(e)))?;
+        let found = self.anchor_or_all(e)?;
         Ok(Matches { members: found.settled(), unclear: found.unclear })
+    }
+
+    /// Evaluates the thing that others are compared with; what the words fit less is there, too.
+    pub(super) fn anchor_or_all(&mut self, e: &Expression) -> Outcome {
+        self.of_any_level(|s| s.inner(|s| s.set(e)))
     }
 
     fn part_of(&mut self, piece: &Expression, whole: &Expression, e: &Expression) -> Outcome {
         let wholes = self.anchor_or_all(whole)?;
         let all = self.scene.identities;
         let pieces = self.of_any_level(|s| s.set(piece));
-        let is_in = |id: IdentityId, whole: IdentityId| id != whole && all.ancestors(id).any(|i| i == whole);
         let pieces = match pieces {
             Ok(found) => found,
             Err(unmet) if unmet.why == Why::Failed => return Err(unmet),
-            Err(unmet) => return Err(self.no_piece(piece, &wholes.settled(), unmet, e)),
+            Err(unmet) => return Err(self.no_piece(piece, &wholes.settled(), unmet.words, e)),
         };
         // The exact "bowl" may lack the part: another match, the fruit bowl, has the apple.
         for wholes_of in [wholes.settled(), wholes.members.clone()] {
-            let within = |m: &Member| wholes_of.iter().any(|w| is_in(m.id, w.id)).then_some(1.0);
+            let within = |m: &Member| wholes_of.iter().any(|w| all.is_piece(m.id, w.id)).then_some(1.0);
             let found = pieces.clone().kept(within);
             if !found.members.is_empty() {
-                let owners = wholes_of.iter().filter(|w| found.members.iter().any(|m| is_in(m.id, w.id))).count();
+                let owners =
+                    wholes_of.iter().filter(|w| found.members.iter().any(|m| all.is_piece(m.id, w.id))).count();
                 let unclear = found.unclear || wholes.unclear || (owners > 1 && !whole.is_plural());
                 let found = Matches { unclear, ..found };
                 self.step(&e.at, format!("of \u{201c}{}\u{201d}", self.said(&whole.at)), &found);
                 return Ok(found);
             }
-        }
-        if !matches!(piece.set, SetOf::Words { .. } | SetOf::Called(_)) {
-            let unmet = self.unmet(Why::Nothing, "", &e.at);
-            return Err(self.no_piece(piece, &wholes.settled(), unmet, e));
         }
         // Things in or on a thing need not be parts of it: the candle on the cake.
         let lies = |s: &Space<'_>, m: &Member| {
@@ -125,21 +126,16 @@ impl Evaluator<'_> {
                 |relation| wholes.members.iter().filter_map(|w| s.share(relation, m.id, w.id)).fold(0.0, f64::max);
             Some(share(Relation::In)).filter(|share| *share >= HOLDS[0])
         };
-        let inside = self.space(&e.at).ok().map(|space| pieces.clone().kept(|m| lies(space, m)));
+        let is_named = matches!(piece.set, SetOf::Words { .. } | SetOf::Called(_));
+        let space = self.space(&e.at).ok().filter(|_| is_named);
+        let inside = space.map(|space| pieces.clone().kept(|m| lies(space, m)));
         match inside.filter(|found| !found.members.is_empty()) {
             Some(found) => Ok(found),
-            None => {
-                let unmet = self.unmet(Why::Nothing, "", &e.at);
-                Err(self.no_piece(piece, &wholes.settled(), unmet, e))
-            }
+            None => Err(self.no_piece(piece, &wholes.settled(), Vec::new(), e)),
         }
     }
 
-    fn anchor_or_all(&mut self, e: &Expression) -> Outcome {
-        self.of_any_level(|s| s.inner(|s| s.set(e)))
-    }
-
-    fn no_piece(&self, piece: &Expression, wholes: &[Member], unmet: Unmet, e: &Expression) -> Unmet {
+    fn no_piece(&self, piece: &Expression, wholes: &[Member], words: Vec<String>, e: &Expression) -> Unmet {
         let all = self.scene.identities;
         let known: Vec<IdentityId> =
             wholes.iter().flat_map(|w| all.children(w.id)).filter(|id| self.scene.is_there(*id)).collect();
@@ -151,7 +147,7 @@ impl Evaluator<'_> {
         };
         let name = wholes.first().map(|w| all.full_name(w.id)).unwrap_or_default();
         let text = format!("The {name} has no \u{201c}{}\u{201d} here; {parts}.", self.said(&piece.at));
-        Unmet { why: Why::Nothing, text, words: unmet.words, near: known, at: e.at.clone() }
+        Unmet { why: Why::Nothing, text, words, near: known, at: e.at.clone() }
     }
 
     fn counted(&mut self, of: &Expression, count: usize, e: &Expression) -> Outcome {

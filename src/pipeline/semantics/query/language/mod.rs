@@ -29,7 +29,6 @@ use self::evaluator::Evaluator;
 use self::expression::{Asks, Expression, Sentence, SetOf};
 use self::outcome::{Matches, QueryStep, Unmet};
 use self::relations::Viewpoint;
-use super::lexicon;
 use super::parse::ParsedQuery;
 use crate::scene::identity::name_words::singular;
 use crate::scene::{Camera, Identities, IdentityId, LevelFilter};
@@ -220,9 +219,6 @@ pub(crate) fn ask(
             None => new,
             Some(old) => better(old, new),
         });
-        if best.as_ref().is_some_and(|b| b.unmet.is_none() && !b.is_ambiguous() && sentences.len() == 1) {
-            break;
-        }
     }
     let mut best = best?;
     best.readings = sentences.len();
@@ -300,11 +296,6 @@ fn better(old: Understood, new: Understood) -> Understood {
     let more = new.found.settled().into_iter().filter(|m| !known.contains(&m.id));
     let members = old.found.settled().into_iter().chain(more).collect();
     Understood { found: Matches { members, unclear: true }, ..old }
-}
-
-/// Returns whether a word is a noun of a thing.
-pub(crate) fn is_a_thing(word: &str) -> bool {
-    lexicon::is_noun(word)
 }
 
 /// Returns whether two words are equal but for a plural or a typing error.

@@ -296,7 +296,7 @@ fn not_there(all: &Evaluator<'_>, words: &[String], at: &Range<usize>) -> Unmet 
         (true, true) => String::new(),
     };
     let words = if unknown.is_empty() { vec![head.clone()] } else { unknown };
-    let is_word = super::is_a_thing(head) || models::is_word(head);
+    let is_word = lexicon::is_noun(head) || models::is_word(head);
     let why = if is_word { Why::Unknown } else { Why::NotUnderstood };
     Unmet { why, text: format!("There is no \u{201c}{said}\u{201d} in this scene.{more}"), words, near, at: at.clone() }
 }

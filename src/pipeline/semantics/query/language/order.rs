@@ -121,9 +121,7 @@ pub(super) fn nearest(
     let sign = if far { -1.0 } else { 1.0 };
     let mut result = Matches { unclear: found.unclear || anchors.unclear, ..Matches::default() };
     for anchor in &anchors.members {
-        let related = |id: IdentityId| {
-            identities.ancestors(id).any(|i| i == anchor.id) || identities.ancestors(anchor.id).any(|i| i == id)
-        };
+        let related = |id: IdentityId| identities.are_related(id, anchor.id);
         // What carries a thing touches it, and is not meant by "nearest".
         let carries = |id: IdentityId| {
             identities.get(id).is_some_and(|i| i.level == Level::Object)

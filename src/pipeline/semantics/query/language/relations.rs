@@ -67,8 +67,8 @@ impl<'a> Space<'a> {
         if thing == anchor {
             return None;
         }
-        let is_piece = self.identities.ancestors(thing).any(|i| i == anchor);
-        let is_whole = self.identities.ancestors(anchor).any(|i| i == thing);
+        let is_piece = self.identities.is_piece(thing, anchor);
+        let is_whole = self.identities.is_piece(anchor, thing);
         match relation {
             Relation::PartOf => return Some(if is_piece { 1.0 } else { 0.0 }),
             Relation::On | Relation::In if is_piece => return Some(1.0),

@@ -21,7 +21,7 @@ pub(super) fn complete(scene: &QueryScene<'_>, answer: &mut Understood) {
         (Asks::Count, Some(unmet)) => Some(format!("0. {}", unmet.text)),
         (Asks::Truth, None) => Some(format!("Yes: {names}.")),
         (Asks::Truth, Some(unmet)) => Some(format!("No. {}", unmet.text)),
-        (Asks::Names, None) => Some(format!("{}.", capital(&names))),
+        (Asks::Names, None) => Some(format!("{}.", format::capital(&names))),
         (Asks::Colors, None) => Some(colors(scene, &ids)),
         (Asks::Size(order), None) => Some(sizes(scene, &ids, order)),
         (Asks::Things | Asks::Names | Asks::Colors | Asks::Size(_), _) => None,
@@ -37,17 +37,14 @@ fn list(scene: &QueryScene<'_>, ids: &[IdentityId]) -> String {
     if ids.len() > MOST {
         names.push(format!("{} more", ids.len() - MOST));
     }
-    match names.as_slice() {
-        [start @ .., last] if !start.is_empty() => format!("{} and {last}", start.join(", ")),
-        _ => names.concat(),
-    }
+    format::list(&names)
 }
 
 fn colors(scene: &QueryScene<'_>, ids: &[IdentityId]) -> String {
     let of = |id: &IdentityId| {
         let has = |row: &usize| scene.identities.colors.judge(*id, *row) == Some(ColorVerdict::Yes);
         let named: Vec<&str> = (0..COLORS.len()).filter(has).map(|row| COLORS[row][0]).collect();
-        let name = capital(&scene.identities.full_name(*id));
+        let name = format::capital(&scene.identities.full_name(*id));
         if named.is_empty() {
             format!("{name}: no color that has a name.")
         } else {
@@ -60,7 +57,7 @@ fn colors(scene: &QueryScene<'_>, ids: &[IdentityId]) -> String {
 fn sizes(scene: &QueryScene<'_>, ids: &[IdentityId], order: OrderBy) -> String {
     let up = scene.place.view.map_or(glam::DVec3::Z, |v| v.up);
     let of = |id: &IdentityId| {
-        let name = capital(&scene.identities.full_name(*id));
+        let name = format::capital(&scene.identities.full_name(*id));
         let Some(e) = scene.identities.shapes.extent(*id, up) else { return format!("{name}: not measured.") };
         let length = |units: f64| format::length(units, scene.place.meters);
         match order {
@@ -70,10 +67,4 @@ fn sizes(scene: &QueryScene<'_>, ids: &[IdentityId], order: OrderBy) -> String {
         }
     };
     ids.iter().take(MOST).map(of).collect::<Vec<_>>().join(" ")
-}
-
-/// Makes the first letter a capital.
-fn capital(text: &str) -> String {
-    let mut letters = text.chars();
-    letters.next().map_or_else(String::new, |c| c.to_uppercase().chain(letters).collect())
 }

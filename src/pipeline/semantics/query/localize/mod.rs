@@ -150,7 +150,7 @@ fn two_steps(identities: &Identities, phrase: &ParsedQuery, level: LevelFilter, 
         _ => {}
     }
     let pieces: Vec<IdentityId> =
-        identities.iter().map(|(id, _)| id).filter(|id| is_piece(identities, *id, object)).collect();
+        identities.iter().map(|(id, _)| id).filter(|id| identities.is_piece(*id, object)).collect();
     if hits[0].score < scorer.threshold() {
         return Answer::NotFound(hits);
     }
@@ -179,7 +179,7 @@ fn implied<'a>(phrase: &'a ParsedQuery, object: IdentityId, scorer: &mut dyn Sco
 fn part_or_object(identities: &Identities, text: &str, whole: &str, hits: Vec<Hit>, scorer: &mut dyn Scorer) -> Answer {
     let object = hits[0];
     let against = scorer.scores(text, Some(whole));
-    let pieces = identities.iter().map(|(id, _)| id).filter(|id| is_piece(identities, *id, object.identity));
+    let pieces = identities.iter().map(|(id, _)| id).filter(|id| identities.is_piece(*id, object.identity));
     let parts = rank(pieces, &against);
     let more = |part: &Hit| part.score > against[object.identity as usize - 1].max(0.5);
     match parts.first().is_some_and(more) && object.score >= scorer.threshold() {
@@ -208,11 +208,6 @@ fn jointly(identities: &Identities, text: &str, whole: &str, scorer: &mut dyn Sc
     judge(identities, rank(pieces, &both), scorer)
 }
 
-/// Returns whether `id` is a piece of `whole`, directly or not.
-fn is_piece(identities: &Identities, id: IdentityId, whole: IdentityId) -> bool {
-    identities.ancestors(id).skip(1).any(|i| i == whole)
-}
-
 /// Finds the whole in step 1; in step 2 only its pieces compete.
 fn piece_of(identities: &Identities, piece: &str, whole: &str, scorer: &mut dyn Scorer) -> Answer {
     let step1 = scorer.scores(whole, None);
@@ -225,7 +220,7 @@ fn piece_of(identities: &Identities, piece: &str, whole: &str, scorer: &mut dyn 
     // Wholes that cannot be told apart all take part.
     let close: Vec<IdentityId> =
         wholes.iter().filter(|w| w.score > best.score - scorer.resolution()).map(|w| w.identity).collect();
-    let mine = |id: IdentityId| close.iter().any(|whole| is_piece(identities, id, *whole));
+    let mine = |id: IdentityId| close.iter().any(|whole| identities.is_piece(id, *whole));
     let pieces: Vec<IdentityId> = identities.iter().map(|(id, _)| id).filter(|id| mine(*id)).collect();
     let plain = scorer.scores(piece, None);
     let against = scorer.scores(piece, Some(whole));
@@ -256,10 +251,7 @@ fn judge(identities: &Identities, hits: Vec<Hit>, scorer: &dyn Scorer) -> Answer
         return Answer::NotFound(hits);
     };
     // A piece and its whole with the same name are not two things.
-    let related = |id: IdentityId| {
-        identities.ancestors(id).any(|i| i == first.identity) || identities.ancestors(first.identity).any(|i| i == id)
-    };
-    let rival = hits.iter().take(TOP).skip(1).find(|h| !related(h.identity));
+    let rival = hits.iter().take(TOP).skip(1).find(|h| !identities.are_related(h.identity, first.identity));
     match rival {
         Some(rival) if first.score - rival.score < scorer.resolution() => Answer::Ambiguous(hits),
         _ => Answer::Found(hits),

@@ -206,14 +206,8 @@ fn having<'a>(g: &mut Grammar<'a>, from: usize, j: usize, not: bool, add: &mut A
 }
 
 fn nearest_to_eye(noun: &Expression, far: bool) -> SetOf {
-    SetOf::Ranked {
-        of: Box::new(noun.clone()),
-        order: OrderBy::Distance,
-        most: far,
-        first: 0,
-        count: 1,
-        superlative: true,
-    }
+    let (of, order) = (Box::new(noun.clone()), OrderBy::Distance);
+    SetOf::Ranked { of, order, most: far, first: 0, count: 1, superlative: true }
 }
 
 /// Reads "nearest to the lamp", "taller than the mug", "over 20 cm tall".

@@ -260,14 +260,14 @@ impl<'a> Grammar<'a> {
         let mut left = self.of(tokens);
         let n = left.words.len();
         let (left, right) = (left.set(0, n, false), self.set(from, j, false));
-        pairs(&left, &right)
-            .into_iter()
-            .map(|(a, b)| self.make(SetOf::Union { of: vec![a, b], either }, i, j))
-            .collect()
+        self.both(&left, &right, i, j, either)
     }
-}
 
-impl Grammar<'_> {
+    fn both(&self, left: &[Expression], right: &[Expression], i: usize, j: usize, either: bool) -> Vec<Expression> {
+        let union = |(a, b)| self.make(SetOf::Union { of: vec![a, b], either }, i, j);
+        pairs(left, right).into_iter().map(union).collect()
+    }
+
     /// Reads "the kettle lid and knob" as both of the kettle.
     fn of_one_whole(&mut self, i: usize, p: usize, from: usize, j: usize, either: bool) -> Vec<Expression> {
         let is_plain = |k: usize| !self.vocabulary.is(WordClass::NoName, self.words[k]);
@@ -279,10 +279,7 @@ impl Grammar<'_> {
         let mut right = self.of(tokens);
         let n = right.words.len();
         let (left, right) = (self.set(i, p, false), right.set(0, n, false));
-        pairs(&left, &right)
-            .into_iter()
-            .map(|(a, b)| self.make(SetOf::Union { of: vec![a, b], either }, i, j))
-            .collect()
+        self.both(&left, &right, i, j, either)
     }
 }
 

@@ -126,12 +126,7 @@ impl<'a> SentenceReader<'a> {
         {
             let (pieces, whole) = (&tokens[..at], &tokens[at + 1..tokens.len() - 1]);
             let (pieces, wholes) = (self.whole.of(pieces.to_vec()).all(), self.whole.of(whole.to_vec()).all());
-            for (piece, whole) in super::pairs(&pieces, &wholes) {
-                let at = piece.at.start..whole.at.end;
-                let set = Expression::new(SetOf::PartOf(Box::new(piece), Box::new(whole)), at);
-                self.found.push(Sentence { asks: Asks::Count, set });
-            }
-            return;
+            return self.part_of(Asks::Count, &pieces, &wholes);
         }
         let skip = [
             &["are", "there"][..],
@@ -177,12 +172,16 @@ impl<'a> SentenceReader<'a> {
         let at = self.whole.words.iter().skip(1).position(|w| matches!(*w, "have" | "contain"));
         let Some(at) = at.filter(|at| *at > 0) else { return };
         // The piece is the answer.
-        let (whole, piece) =
+        let (wholes, pieces) =
             (self.whole.of(tokens[..at].to_vec()).all(), self.whole.of(tokens[at + 1..].to_vec()).all());
-        for (piece, whole) in super::pairs(&piece, &whole) {
-            let at = whole.at.start..piece.at.end;
+        self.part_of(Asks::Truth, &pieces, &wholes);
+    }
+
+    fn part_of(&mut self, asks: Asks, pieces: &[Expression], wholes: &[Expression]) {
+        for (piece, whole) in super::pairs(pieces, wholes) {
+            let at = piece.at.start.min(whole.at.start)..piece.at.end.max(whole.at.end);
             let set = Expression::new(SetOf::PartOf(Box::new(piece), Box::new(whole)), at);
-            self.found.push(Sentence { asks: Asks::Truth, set });
+            self.found.push(Sentence { asks, set });
         }
     }
 
@@ -261,14 +260,9 @@ impl<'a> SentenceReader<'a> {
             && words.get(2).is_some_and(|w| matches!(*w, "does" | "do"))
             && words[n - 1] == "have"
         {
-            let of = self.whole.of(tokens[3..n - 1].to_vec()).all();
-            for whole in of {
-                let parts = self.whole.make(SetOf::Any { parts: true, plural: true }, 1, 2);
-                let at = parts.at.start..whole.at.end;
-                let set = Expression::new(SetOf::PartOf(Box::new(parts), Box::new(whole)), at);
-                self.found.push(Sentence { asks: Asks::Names, set });
-            }
-            return;
+            let parts = self.whole.make(SetOf::Any { parts: true, plural: true }, 1, 2);
+            let wholes = self.whole.of(tokens[3..n - 1].to_vec()).all();
+            return self.part_of(Asks::Names, &[parts], &wholes);
         }
         self.plain(Asks::Names, 1, n);
     }
