@@ -111,12 +111,13 @@ pub(super) fn filtered(
     };
     let kept = Matches { unclear, ..kept };
     let text = format!("{}{}", all.said(&tail(of, at)), all.seen_from_here(is_of_view(is)));
+    let is_measure = matches!(is, Condition::Compared { .. } | Condition::Measured { .. } | Condition::Within { .. });
     if kept.members.is_empty() {
+        all.failed_measure |= is_measure;
         return Err(none_is(all, &before, &text, at));
     }
     let is_idle = kept.members.len() == before.members.len();
     all.idle += usize::from(is_idle);
-    let is_measure = matches!(is, Condition::Compared { .. } | Condition::Measured { .. } | Condition::Within { .. });
     all.idle_measure |= is_idle && is_measure;
     all.step(&tail(of, at), text, &kept);
     Ok(kept)

@@ -20,6 +20,8 @@ pub(super) struct Evaluator<'a> {
     pub(super) idle: usize,
     /// True if a comparison removed nothing.
     pub(super) idle_measure: bool,
+    /// True if a comparison removed all.
+    pub(super) failed_measure: bool,
     /// True once the view decided.
     pub(super) of_view: bool,
     /// Remarks on the way, such as "a kettle is a kind of pot".
@@ -39,7 +41,7 @@ impl<'a> Evaluator<'a> {
     pub(super) fn new(scene: &'a QueryScene<'a>, text: &'a str, looks: Option<&'a mut dyn Looks>) -> Self {
         let space = scene.place.view.map(|view| Space::new(scene.identities, view));
         let (steps, notes, looked, antecedent, depth, any_level) = (Vec::new(), Vec::new(), false, None, 0, false);
-        let (with_stages, idle, idle_measure, of_view) = (false, 0, false, false);
+        let (with_stages, idle, idle_measure, failed_measure, of_view) = (false, 0, false, false, false);
         Self {
             scene,
             space,
@@ -54,6 +56,7 @@ impl<'a> Evaluator<'a> {
             with_stages,
             idle,
             idle_measure,
+            failed_measure,
             of_view,
         }
     }

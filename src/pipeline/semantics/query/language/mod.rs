@@ -113,6 +113,8 @@ pub(crate) struct Understood {
     idle: usize,
     /// True if a comparison removed nothing.
     idle_measure: bool,
+    /// True if a comparison removed all.
+    failed_measure: bool,
     /// True if it joins several sets.
     is_union: bool,
 }
@@ -234,7 +236,7 @@ fn answer<'a>(
 ) -> Understood {
     let mut evaluator = Evaluator::new(scene, text, looks);
     let found = evaluator.set(&sentence.set);
-    let Evaluator { steps, notes, looked, idle, idle_measure, of_view, .. } = evaluator;
+    let Evaluator { steps, notes, looked, idle, idle_measure, failed_measure, of_view, .. } = evaluator;
     let plural = sentence.set.is_plural() || matches!(sentence.asks, Asks::Count | Asks::Names | Asks::Truth);
     let (found, unmet) = match found {
         Ok(found) => (found, None),
@@ -255,6 +257,7 @@ fn answer<'a>(
         of_view,
         idle,
         idle_measure,
+        failed_measure,
         is_union,
     }
 }
@@ -262,11 +265,13 @@ fn answer<'a>(
 /// Chooses between the answers of two readings: one that finds a thing, and clearly; if both do and differ, both.
 fn better(old: Understood, new: Understood) -> Understood {
     let rank = |u: &Understood| match &u.unmet {
-        // "The box on the shelf taller than a meter" is said of the box.
+        // "The box on the shelf taller than a meter" is said of the box, even if none is: not of the only shelf. But a
+        // reading that misses a word of the sentence, or a piece, is no reason against one that finds a thing.
         None if u.idle_measure => 3,
         None if !u.is_ambiguous() => 0,
         None => 1,
-        Some(unmet) => 2 + unmet.why as usize,
+        Some(_) if u.failed_measure => 2,
+        Some(unmet) => 4 + unmet.why as usize,
     };
     let (a, b) = (rank(&old), rank(&new));
     if b < a {

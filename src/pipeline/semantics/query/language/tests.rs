@@ -1,12 +1,15 @@
 //! Compounds, slips and names by the words of the demo's scene.
 
+use glam::DVec3;
+
 use crate::pipeline::semantics::query::answer::QueryAnswer;
 use crate::pipeline::semantics::query::language::QueryPlace;
+use crate::pipeline::semantics::query::language::relations::Viewpoint;
 use crate::pipeline::semantics::query::localize::Answer;
 use crate::pipeline::semantics::query::query_engine::ask_by_name;
 use crate::pipeline::semantics::query::reading::QueryReading;
 use crate::pipeline::semantics::query::recipe::QueryConfig;
-use crate::scene::{Identities, Level, LevelFilter, NO_IDENTITY};
+use crate::scene::{Bounds, Identities, Level, LevelFilter, NO_IDENTITY};
 
 /// Returns the demo's scene, and the lists of questions.
 fn data() -> (Identities, toml::Table) {
@@ -34,7 +37,10 @@ fn ask(all: &Identities, text: &str, level: LevelFilter) -> QueryAnswer {
 }
 
 fn summary(all: &Identities, text: &str) -> String {
-    let answered = ask(all, text, LevelFilter::Auto);
+    told(all, ask(all, text, LevelFilter::Auto))
+}
+
+fn told(all: &Identities, answered: QueryAnswer) -> String {
     let first = answered.answer.hits().first().map(|h| all.full_name(h.identity)).unwrap_or_default();
     match answered.answer {
         Answer::Found(hits) if hits.len() > 1 => format!("all {} {first}", hits.len()),
@@ -84,6 +90,41 @@ fn any_words_in_any_order_are_read_in_no_time() {
         {
             assert!(answered.chosen(1).iter().all(|id| all.get(*id).is_some()), "{text}");
         }
+    }
+}
+
+/// A comparison that removes nothing is still true: other readings in which words are missed do not outweigh it.
+#[test]
+fn a_comparison_that_all_meet_is_met() {
+    let mut all = Identities::default();
+    let mut boxes = vec![None];
+    for (name, at, size) in [
+        ("teddy bear", [0.0, 0.0, 0.0], [0.2, 0.2, 0.4]),
+        ("toy car", [1.0, 0.0, 0.0], [0.3, 0.2, 0.1]),
+        ("shelf", [4.0, 0.0, 0.0], [1.0, 0.4, 2.0]),
+        ("box", [4.0, 0.0, 2.0], [0.3, 0.3, 0.3]),
+    ] {
+        all.add(Level::Object, NO_IDENTITY, vec![name.into()]);
+        let min = DVec3::from(at);
+        boxes.push(Some(Bounds { min, max: min + DVec3::from(size) }));
+    }
+    all.set_boxes(&boxes);
+    let view = Viewpoint { eye: DVec3::new(2.0, -6.0, 1.0), forward: DVec3::Y, up: DVec3::Z };
+    let place = QueryPlace { view: Some(view), meters: Some(1.0), ..QueryPlace::default() };
+    for (text, wanted) in [
+        ("the car at most 1.2 m from the bear", "toy car"),
+        ("find the teddy bear that is within 90 centimetres of the car", "teddy bear"),
+        ("the bear clearly taller than the car", "teddy bear"),
+        ("the bear which is under 50 cm in height", "teddy bear"),
+        ("the box on the shelf taller than 20 cm", "box"),
+        ("the car at most 20 cm from the bear", "not found"),
+        ("the car clearly taller than the bear", "not found"),
+        ("the bear which is under 20 cm in height", "not found"),
+        // Said of the box, not of the shelf, which is taller.
+        ("the box on the shelf taller than a meter", "not found"),
+    ] {
+        let answered = ask_by_name(&all, text, (LevelFilter::Auto, &place), &QueryConfig::default()).expect("words");
+        assert_eq!(told(&all, answered), wanted, "{text}");
     }
 }
 
