@@ -1,7 +1,7 @@
 //! Words beyond the names of a scene: which words mean the same thing, and what is a kind of what, by WordNet.
 //! `tools/lexicon/build.py` made `assets/lexicon.z` and describes its sections. Needs no network.
 //!
-//! Words are in lower case and in the singular, as [`super::words`] makes them, with a space between them.
+//! Words are in lower case and in the singular, as [`singular`](crate::scene::identity::name_words::singular) makes them, with a space between them.
 
 use std::cmp::Ordering;
 use std::io::Read;
@@ -56,7 +56,7 @@ pub(crate) fn is_noun(word: &str) -> bool {
     find(Lexicon::get().words, word).is_some()
 }
 
-/// Returns the singular of a plural that the rules in [`super::words`] do not understand: "mouse" for "mice".
+/// Returns the singular of a plural that the rules in `name_words` do not understand: "mouse" for "mice".
 #[must_use]
 pub(crate) fn singular_of(plural: &str) -> Option<&'static str> {
     find(Lexicon::get().plurals, plural)

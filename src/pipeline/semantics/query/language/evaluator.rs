@@ -30,7 +30,8 @@ pub(super) struct Evaluator<'a> {
     pub(super) looked: bool,
     /// Thing that "one" stands for in a part of a sentence.
     pub(super) antecedent: Option<String>,
-    depth: usize,
+    /// Number of expressions around the one that is evaluated.
+    pub(super) depth: usize,
     /// True where the level that is asked for does not matter: in anchors and wholes.
     any_level: bool,
     /// True if "things" may be what most others stand on.

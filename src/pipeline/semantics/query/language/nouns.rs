@@ -51,7 +51,8 @@ pub(super) fn any(all: &mut Evaluator<'_>, parts: bool) -> Matches {
     let wanted =
         identities.iter().filter(|(id, i)| i.level == level && !stages.contains(id) && all.scene.is_there(*id));
     let found: Vec<Member> = wanted.map(|(id, _)| member(id)).collect();
-    if !stages.is_empty() && !parts && found.len() < identities.count(level) {
+    // Worth a remark where they are asked for, not where others are compared with them.
+    if !stages.is_empty() && !parts && all.depth == 0 && found.len() < identities.count(level) {
         let names: Vec<String> = stages.iter().map(|id| identities.label(*id)).collect();
         let note = format!("Not counting what the others stand on: {}.", names.join(", "));
         if !all.notes.contains(&note) {
