@@ -9,7 +9,9 @@ use crate::io::scene_files::is_scene;
 use crate::io::splat_format::SplatFormat;
 use crate::io::{self, Opened};
 use crate::measure::StudyError;
-use crate::measure::bench::{StageSample, StageValues, Timings, draw, label, masks, moving, one_core, query, train};
+use crate::measure::bench::{
+    StageSample, StageValues, Timings, draw, label, masks, moving, one_core, query, questions, train,
+};
 use crate::models;
 use crate::pipeline::observer::{Interrupted, Observer, Severity};
 use crate::pipeline::semantics::lifting::network_segmenter::NetworkMasks;
@@ -59,6 +61,7 @@ pub(crate) fn run(request: &BenchRequest, observer: &mut dyn Observer) -> Result
     let device = request.gpu.then(Device::shared).transpose()?;
     let mut samples = one_core::limit();
     if let Some((count, identities)) = request.queries {
+        samples.extend(questions::time(identities, count));
         let mut encoder = models::encoder(models::DEMO)?;
         samples.extend(query::time(encoder.as_mut(), identities, QUERY_SIZE, count)?);
     }

@@ -24,6 +24,7 @@ pub mod resource_log;
 mod rig;
 pub(crate) mod semantic_map;
 pub(crate) mod shapes;
+pub(crate) mod support;
 pub(crate) mod text;
 pub(crate) mod undo;
 

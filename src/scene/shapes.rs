@@ -7,7 +7,8 @@ use std::sync::{Arc, OnceLock};
 use glam::DVec3;
 use rayon::prelude::*;
 
-use super::{Bounds, GaussianCloud, IdentityId, SemanticMap};
+use super::support::Support;
+use super::{Bounds, GaussianCloud, Identities, IdentityId, SemanticMap};
 
 /// Number of points spread evenly over an identity's Gaussians.
 const SPREAD: usize = 32;
@@ -18,8 +19,13 @@ pub(crate) struct SampledShape {
     /// Points spread over the surface, then the outermost ones of many directions.
     points: Vec<DVec3>,
     spread: usize,
+    /// Interval along each of the [`DIRECTIONS`].
+    spans: [(f64, f64); DIRECTIONS],
     pub(crate) bounds: Bounds,
 }
+
+/// Number of directions in which a shape is measured.
+const DIRECTIONS: usize = 13;
 
 impl SampledShape {
     /// Samples finite points; `None` without any. Strays are left out.
@@ -36,12 +42,18 @@ impl SampledShape {
             let along = |a: &&DVec3, b: &&DVec3| a.dot(axis).total_cmp(&b.dot(axis));
             points.extend(kept.iter().min_by(along).into_iter().chain(kept.iter().max_by(along)).copied());
         }
-        Some(Self { points, spread, bounds })
+        Some(Self::measured(points, spread, bounds))
+    }
+
+    fn measured(points: Vec<DVec3>, spread: usize, bounds: Bounds) -> Self {
+        let mut shape = Self { points, spread, spans: [(0.0, 0.0); DIRECTIONS], bounds };
+        shape.spans = directions().map(|axis| shape.span(axis));
+        shape
     }
 
     /// Takes over the points of a piece that are farther out.
     fn add(&mut self, piece: &Self) {
-        for (k, axis) in directions().enumerate() {
+        for (k, axis) in directions().into_iter().enumerate() {
             for (at, sign) in [(2 * k, -1.0), (2 * k + 1, 1.0)] {
                 let (own, other) = (self.points.get(self.spread + at), piece.points.get(piece.spread + at));
                 if let (Some(own), Some(other)) = (own, other)
@@ -53,6 +65,7 @@ impl SampledShape {
         }
         let (a, b) = (&mut self.bounds, &piece.bounds);
         (a.min, a.max) = (a.min.min(b.min), a.max.max(b.max));
+        self.spans = directions().map(|axis| self.span(axis));
     }
 
     /// Samples a box.
@@ -61,7 +74,7 @@ impl SampledShape {
         let mut points: Vec<DVec3> = (0..64).map(|i| bounds.min + bounds.size() * steps(i)).collect();
         let spread = points.len();
         points.extend([bounds.min, bounds.max]);
-        Self { points, spread, bounds }
+        Self::measured(points, spread, bounds)
     }
 
     /// Points spread over the surface.
@@ -88,18 +101,15 @@ impl SampledShape {
     /// Lower bound of the distance to another shape: the widest gap along any of many directions. 0 if they touch.
     pub(crate) fn gap(&self, other: &Self) -> f64 {
         let boxes = (self.bounds.min - other.bounds.max).max(other.bounds.min - self.bounds.max);
-        let along = |axis: DVec3| {
-            let (a, b) = (self.span(axis), other.span(axis));
-            (a.0 - b.1).max(b.0 - a.1)
-        };
-        let apart = directions().map(along).fold(f64::NEG_INFINITY, f64::max);
+        let along = self.spans.iter().zip(&other.spans).map(|(a, b)| (a.0 - b.1).max(b.0 - a.1));
+        let apart = along.fold(f64::NEG_INFINITY, f64::max);
         apart.max(boxes.max(DVec3::ZERO).length()).max(0.0)
     }
 }
 
 /// Thirteen directions: axes, diagonals of faces and of the cube.
-fn directions() -> impl Iterator<Item = DVec3> {
-    const ALL: [[i8; 3]; 13] = [
+fn directions() -> [DVec3; DIRECTIONS] {
+    const ALL: [[i8; 3]; DIRECTIONS] = [
         [1, 0, 0],
         [0, 1, 0],
         [0, 0, 1],
@@ -114,7 +124,16 @@ fn directions() -> impl Iterator<Item = DVec3> {
         [1, -1, 1],
         [-1, 1, 1],
     ];
-    ALL.into_iter().map(|d| DVec3::from(d.map(f64::from)).normalize_or_zero())
+    ALL.map(|d| DVec3::from(d.map(f64::from)).normalize_or_zero())
+}
+
+/// Returns two level unit axes and the unit up direction: the same for every view.
+pub(super) fn upright_axes(up: DVec3) -> Option<[DVec3; 3]> {
+    let up = up.try_normalize().unwrap_or(DVec3::Z);
+    let axes = [DVec3::X, DVec3::Y, DVec3::Z].into_iter();
+    let level = axes.min_by(|a, b| a.dot(up).abs().total_cmp(&b.dot(up).abs()))?;
+    let first = (level - up * level.dot(up)).try_normalize()?;
+    Some([first, up.cross(first), up])
 }
 
 /// Edges of a thing's own upright box, in scene units.
@@ -133,11 +152,7 @@ impl Extent {
     /// on a view.
     pub(crate) fn new(points: &[DVec3], up: DVec3) -> Option<Self> {
         const STEP_DEG: f64 = 3.0;
-        let up = up.try_normalize().unwrap_or(DVec3::Z);
-        let axes = [DVec3::X, DVec3::Y, DVec3::Z].into_iter();
-        let level = axes.min_by(|a, b| a.dot(up).abs().total_cmp(&b.dot(up).abs()))?;
-        let first = (level - up * level.dot(up)).try_normalize()?;
-        let second = up.cross(first);
+        let [first, second, up] = upright_axes(up)?;
         let flat: Vec<[f64; 3]> = points.iter().map(|p| [p.dot(first), p.dot(second), p.dot(up)]).collect();
         let length = |values: &mut dyn Iterator<Item = f64>| {
             let (low, high) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), x| (l.min(x), h.max(x)));
@@ -171,8 +186,8 @@ pub(crate) struct SeenShapes {
     all: Arc<[Option<SampledShape>]>,
     /// Upright boxes for the up direction that was asked for first.
     extents: Arc<OnceLock<(DVec3, Vec<Option<Extent>>)>>,
-    /// Objects on which most others stand, for the up direction that was asked for first.
-    stages: Arc<OnceLock<(DVec3, Vec<IdentityId>)>>,
+    /// What carries what, for the up direction that was asked for first.
+    support: Arc<OnceLock<(DVec3, Arc<Support>)>>,
 }
 
 impl PartialEq for SeenShapes {
@@ -227,10 +242,11 @@ impl SeenShapes {
         if *known_up == up { *known.get(id as usize)? } else { fit(self.all.get(id as usize)?) }
     }
 
-    /// Objects on which most others stand, computed by `find` once per up direction.
-    pub(crate) fn stages(&self, up: DVec3, find: impl Fn() -> Vec<IdentityId>) -> Vec<IdentityId> {
-        let (known_up, known) = self.stages.get_or_init(|| (up, find()));
-        if *known_up == up { known.clone() } else { find() }
+    /// What carries what, for identities with these shapes.
+    pub(crate) fn support(&self, identities: &Identities, up: DVec3) -> Arc<Support> {
+        let find = || Arc::new(Support::of(self, identities, up));
+        let (known_up, known) = self.support.get_or_init(|| (up, find()));
+        if *known_up == up { Arc::clone(known) } else { find() }
     }
 }
 

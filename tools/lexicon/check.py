@@ -10,7 +10,7 @@ from pathlib import Path
 from lookup import Lexicon
 
 ROOT = Path(__file__).resolve().parent.parent.parent
-PAIRS = ROOT / "src/pipeline/semantics/query/lexicon/pairs.txt"
+PAIRS = ROOT / "src/scene/identity/lexicon/pairs.txt"
 
 
 def main() -> None:

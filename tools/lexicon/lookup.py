@@ -1,4 +1,4 @@
-"""Looks words up in the asset as src/pipeline/semantics/query/lexicon.rs does, to try changes without building."""
+"""Looks words up in the asset as src/scene/identity/lexicon.rs does, to try changes without building."""
 
 import zlib
 from pathlib import Path

@@ -6,6 +6,7 @@ pub(crate) mod masks;
 pub(crate) mod moving;
 pub(crate) mod one_core;
 pub(crate) mod query;
+pub(crate) mod questions;
 pub mod train;
 
 use std::path::Path;

@@ -2,6 +2,7 @@
 //!
 //! A parent's number is smaller than its pieces', so every walk up the tree ends.
 
+pub(crate) mod lexicon;
 pub(crate) mod name_words;
 pub(crate) mod whole_names;
 
@@ -98,6 +99,8 @@ pub struct Identities {
 struct Known {
     whole: OnceLock<Arc<WholeNames>>,
     words: OnceLock<Arc<SceneWords>>,
+    /// Children of each, by number from 0.
+    children: OnceLock<Arc<[Vec<IdentityId>]>>,
 }
 
 impl PartialEq for Known {
@@ -264,8 +267,15 @@ impl Identities {
         std::array::from_fn(|c| if c < 3 { object[c] } else { part[c - 3] })
     }
 
+    /// Identities whose parent it is.
     pub(crate) fn children(&self, id: IdentityId) -> impl Iterator<Item = IdentityId> + '_ {
-        self.iter().filter(move |(_, i)| i.parent == id && id != NO_IDENTITY).map(|(i, _)| i)
+        let all = self.known.children.get_or_init(|| {
+            let mut all = vec![Vec::new(); self.list.len() + 1];
+            let inner = self.iter().filter(|(_, i)| i.parent != NO_IDENTITY);
+            inner.for_each(|(id, i)| all.get_mut(i.parent as usize).into_iter().for_each(|of| of.push(id)));
+            all.into()
+        });
+        all.get(id as usize).into_iter().flatten().copied()
     }
 }
 

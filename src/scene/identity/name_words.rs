@@ -1,7 +1,9 @@
 //! Words of the names of a scene, for questions: computed once, looked up by word.
 
 use std::collections::HashMap;
+use std::sync::OnceLock;
 
+use super::lexicon::kinds::NameKinds;
 use super::{Identities, IdentityId};
 
 /// Most characters of a name that are compared.
@@ -54,6 +56,8 @@ pub(crate) struct SceneWords {
     by_word: HashMap<String, Vec<IdentityId>>,
     /// Words as they are written, by their singular.
     written: HashMap<String, String>,
+    /// Names by what their things are, once it was asked for.
+    kinds: OnceLock<NameKinds>,
     /// Most words of a name or full name.
     pub(crate) longest: usize,
 }
@@ -83,6 +87,16 @@ impl SceneWords {
     /// Words of the names of an identity.
     pub(crate) fn names(&self, id: IdentityId) -> &[Vec<String>] {
         (id as usize).checked_sub(1).and_then(|i| self.of.get(i)).map(|of| of.names.as_slice()).unwrap_or_default()
+    }
+
+    /// Names by what their things are.
+    pub(crate) fn kinds(&self) -> &NameKinds {
+        self.kinds.get_or_init(|| {
+            let ids = self.of.iter().zip(1..);
+            let names =
+                ids.flat_map(|(of, id)| of.names.iter().enumerate().map(move |(k, name)| (name.join(" "), id, k)));
+            NameKinds::new(names)
+        })
     }
 
     /// Identities that have a word, in the singular, in a name of their own.

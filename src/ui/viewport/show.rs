@@ -15,7 +15,7 @@ use super::tools::{CardPlaces, Tool};
 use super::visible::VisibleCloud;
 use super::{Viewport, frusta, query, route};
 use crate::pipeline::semantics::query::language::QueryPlace;
-use crate::pipeline::semantics::query::language::relations::Viewpoint;
+use crate::pipeline::semantics::query::language::viewpoint::Viewpoint;
 use crate::ui::ctx::Ctx;
 use crate::worker::ViewMode;
 use crate::worker::view::{QualityBudget, SkipPasses, ViewRequest};

@@ -8,14 +8,14 @@
 //! 4. [`answer`] puts it together, with the time of each of the [`timing`] stages.
 //! 5. [`matching`] finds the pixels and the Gaussians of the answer.
 //!
-//! The [`lexicon`] knows words that no name has. All choices are settings of one [`recipe`].
+//! The [`lexicon`](crate::scene::identity::lexicon) knows words that no name has. All choices are settings of one
+//! [`recipe`].
 
 pub mod answer;
 pub mod by_embedding;
 pub(crate) mod colors;
 pub(crate) mod grounds;
 pub(crate) mod language;
-pub(crate) mod lexicon;
 pub mod localize;
 pub mod matching;
 pub(crate) mod names;

@@ -144,7 +144,17 @@ pub(crate) fn ask_by_name(
     recipe: &QueryConfig,
 ) -> Option<QueryAnswer> {
     let reading = QueryReading::new(identities, text, recipe)?;
-    Some(answer(identities, &reading, from, recipe, None))
+    Some(answer_by_name(identities, &reading, from, recipe))
+}
+
+/// Answers a question that was read before, by names alone.
+pub(crate) fn answer_by_name(
+    identities: &Identities,
+    reading: &QueryReading,
+    from: (LevelFilter, &QueryPlace),
+    recipe: &QueryConfig,
+) -> QueryAnswer {
+    answer(identities, reading, from, recipe, None)
 }
 
 /// Answers a question by these `features` alone, without regard to names; `None` if there is nothing in it. `source`

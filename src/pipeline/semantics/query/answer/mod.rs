@@ -205,14 +205,13 @@ pub(crate) fn by_language(
     };
     let answer = told::answer(identities, reading, understood.as_ref());
     let since = Instant::now();
-    let alone = names::scores(identities, &reading.phrase.target);
-    let mut relevancy = vec![0.0; identities.len() + 1];
+    // An identity that shares words but not the whole query is related, not meant.
+    let alone = names::scores(identities, &reading.phrase.target).into_iter().map(|score| 0.5 * score);
+    let mut relevancy: Vec<f32> = [0.0].into_iter().chain(alone).collect();
     let meant = if let Answer::NotFound(_) = answer { &[] } else { answer.hits() };
+    meant.iter().rev().for_each(|hit| relevancy[hit.identity as usize] = hit.score);
     for (id, identity) in identities.iter() {
-        let hit = meant.iter().find(|h| h.identity == id);
-        // An identity that shares words but not the whole query is related, not meant.
-        let own = hit.map_or(0.5 * alone[id as usize - 1], |h| h.score);
-        relevancy[id as usize] = f32::max(own, relevancy[identity.parent as usize]);
+        relevancy[id as usize] = f32::max(relevancy[id as usize], relevancy[identity.parent as usize]);
     }
     let stages = StagesMs { relevancy: ms_since(since), localize, ..StagesMs::default() };
     let is_rough = encoder.is_some_and(|l| models::is_rough(&l.features.encoder));

@@ -5,9 +5,9 @@ use std::ops::Range;
 use super::evaluator::{Evaluator, Outcome};
 use super::outcome::{Matches, Unmet, Why};
 use super::relations::HOLDS;
-use crate::pipeline::semantics::query::lexicon;
 use crate::scene::IdentityId;
 use crate::scene::colors::{ColorVerdict, row, tone};
+use crate::scene::identity::lexicon;
 
 /// Class of an adjective.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

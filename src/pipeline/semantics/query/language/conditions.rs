@@ -1,15 +1,16 @@
 //! Conditions on the members of a set: places, pieces, colors, comparisons.
 
+use std::collections::HashSet;
 use std::ops::Range;
 
 use super::evaluator::{Evaluator, Outcome};
 use super::expression::{Condition, Expression, OrderBy, Relation};
 use super::outcome::{Matches, Member, Unmet, Why};
-use super::relations::{HOLDS, Space};
+use super::relations::{HOLDS, Space, Way};
 use super::{adjectives, order};
 use crate::math::format;
-use crate::pipeline::semantics::query::lexicon;
 use crate::scene::IdentityId;
+use crate::scene::identity::lexicon;
 
 /// Members of a set for which a condition holds, or does not.
 pub(super) fn filtered(
@@ -38,20 +39,15 @@ pub(super) fn filtered(
             };
             if several && !not {
                 // Which of the anchors is meant does not matter if only one has anything there.
-                let own = |m: &Member, a: IdentityId| identities.object_of(a) == identities.object_of(m.id);
+                let owners: HashSet<IdentityId> = anchors[0].iter().map(|a| identities.object_of(*a)).collect();
+                let others = || found.members.iter().filter(|m| !owners.contains(&identities.object_of(m.id)));
                 let with_each = anchors[0].iter().map(|a| {
-                    found
-                        .members
-                        .iter()
-                        .filter(|m| {
-                            !anchors[0].iter().any(|o| own(m, *o)) && share(m, *a).is_some_and(|s| s >= HOLDS[1])
-                        })
-                        .map(|m| m.id)
-                        .collect::<Vec<_>>()
+                    let there = others().filter(|m| share(m, *a).is_some_and(|s| s >= HOLDS[1]));
+                    there.map(|m| m.id).collect::<Vec<_>>()
                 });
-                let mut with_each: Vec<Vec<IdentityId>> = with_each.filter(|ids| !ids.is_empty()).collect();
-                with_each.dedup();
-                unclear |= with_each.len() > 1;
+                let mut with_each = with_each.filter(|ids| !ids.is_empty());
+                let first = with_each.next();
+                unclear |= first.is_some_and(|first| with_each.any(|other| other != first));
             }
             let holds = |m: &Member| {
                 // "The stick behind the body": the body of the same thing, if it has one.
@@ -74,14 +70,15 @@ pub(super) fn filtered(
         }
         Condition::Between(..) => {
             let space = all.space(at)?;
-            let mut pairs: Vec<[IdentityId; 2]> = Vec::new();
+            let mut ways = Vec::new();
             let [first, second] = [&anchors[0], &anchors[1]];
             for (k, a) in first.iter().enumerate() {
                 let from = if first == second { k + 1 } else { 0 };
-                pairs.extend(second.iter().skip(from).map(|b| [*a, *b]));
+                ways.extend(second.iter().skip(from).map(|b| space.way(*a, *b)));
             }
-            unclear |= pairs.len() > 1;
-            let holds = |m: &Member| pairs.iter().filter_map(|[a, b]| space.between(m.id, *a, *b)).fold(-1.0, f64::max);
+            unclear |= ways.len() > 1;
+            let ways: Vec<Way> = ways.into_iter().flatten().collect();
+            let holds = |m: &Member| ways.iter().filter_map(|way| space.between(m.id, way)).fold(-1.0, f64::max);
             found.judged(not, holds)
         }
         Condition::Has(_) => {

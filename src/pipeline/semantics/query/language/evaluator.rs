@@ -12,7 +12,7 @@ pub(super) type Outcome = Result<Matches, Unmet>;
 /// Evaluator of the readings of one text.
 pub(super) struct Evaluator<'a> {
     pub(super) scene: &'a QueryScene<'a>,
-    pub(super) space: Option<Space<'a>>,
+    pub(super) space: Option<&'a Space<'a>>,
     pub(super) text: &'a str,
     pub(super) looks: Option<&'a mut dyn Looks>,
     pub(super) steps: Vec<QueryStep>,
@@ -39,8 +39,12 @@ pub(super) struct Evaluator<'a> {
 }
 
 impl<'a> Evaluator<'a> {
-    pub(super) fn new(scene: &'a QueryScene<'a>, text: &'a str, looks: Option<&'a mut dyn Looks>) -> Self {
-        let space = scene.place.view.map(|view| Space::new(scene.identities, view));
+    pub(super) fn new(
+        scene: &'a QueryScene<'a>,
+        space: Option<&'a Space<'a>>,
+        text: &'a str,
+        looks: Option<&'a mut dyn Looks>,
+    ) -> Self {
         let (steps, notes, looked, antecedent, depth, any_level) = (Vec::new(), Vec::new(), false, None, 0, false);
         let (with_stages, idle, idle_measure, failed_measure, of_view) = (false, 0, false, false, false);
         Self {
@@ -72,8 +76,8 @@ impl<'a> Evaluator<'a> {
     }
 
     /// Shapes and view, which relations and orders need.
-    pub(super) fn space(&self, at: &Range<usize>) -> Result<&Space<'a>, Unmet> {
-        let known = self.space.as_ref().filter(|s| s.shapes.are_known());
+    pub(super) fn space(&self, at: &Range<usize>) -> Result<&'a Space<'a>, Unmet> {
+        let known = self.space.filter(|s| s.shapes.are_known());
         known.ok_or_else(|| self.unmet(Why::NotUnderstood, "Nothing is known here of where things are.", at))
     }
 

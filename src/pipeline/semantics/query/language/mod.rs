@@ -21,14 +21,18 @@ pub(crate) mod relations;
 pub(crate) mod said;
 pub(crate) mod slips;
 pub(crate) mod tokens;
+pub(crate) mod viewpoint;
 pub(crate) mod words;
+
+use std::collections::HashSet;
 
 use glam::DVec3;
 
 use self::evaluator::Evaluator;
 use self::expression::{Asks, Expression, Sentence, SetOf};
 use self::outcome::{Matches, QueryStep, Unmet};
-use self::relations::Viewpoint;
+use self::relations::Space;
+use self::viewpoint::Viewpoint;
 use super::parse::ParsedQuery;
 use crate::scene::identity::name_words::singular;
 use crate::scene::{Camera, Identities, IdentityId, LevelFilter};
@@ -214,9 +218,10 @@ pub(crate) fn ask(
     mut looks: Option<&mut dyn Looks>,
 ) -> Option<Understood> {
     let mut best: Option<Understood> = None;
+    let space = scene.place.view.map(|view| Space::new(scene.identities, view));
     for sentence in sentences {
         let looks: Option<&mut dyn Looks> = looks.as_deref_mut().map(|l| l as &mut dyn Looks);
-        let new = answer(scene, text, sentence, looks);
+        let new = answer(scene, space.as_ref(), text, sentence, looks);
         best = Some(match best {
             None => new,
             Some(old) => better(old, new),
@@ -230,11 +235,12 @@ pub(crate) fn ask(
 
 fn answer<'a>(
     scene: &'a QueryScene<'a>,
+    space: Option<&'a Space<'a>>,
     text: &'a str,
     sentence: &Sentence,
     looks: Option<&'a mut dyn Looks>,
 ) -> Understood {
-    let mut evaluator = Evaluator::new(scene, text, looks);
+    let mut evaluator = Evaluator::new(scene, space, text, looks);
     let found = evaluator.set(&sentence.set);
     let Evaluator { steps, notes, looked, idle, idle_measure, failed_measure, of_view, .. } = evaluator;
     let plural = sentence.set.is_plural() || matches!(sentence.asks, Asks::Count | Asks::Names | Asks::Truth);
@@ -297,7 +303,7 @@ fn better(old: Understood, new: Understood) -> Understood {
     if old.is_union && new.is_union && (a.iter().all(|id| b.contains(id)) || b.iter().all(|id| a.contains(id))) {
         return if a.len() < b.len() { old } else { new };
     }
-    let known = ids(&old);
+    let known: HashSet<IdentityId> = ids(&old).into_iter().collect();
     let more = new.found.settled().into_iter().filter(|m| !known.contains(&m.id));
     let members = old.found.settled().into_iter().chain(more).collect();
     Understood { found: Matches { members, unclear: true }, ..old }

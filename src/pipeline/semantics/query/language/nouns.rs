@@ -1,14 +1,15 @@
 //! Sets that a noun stands for: by name, by words of names, by kind, by the encoder.
 
+use std::collections::BTreeSet;
 use std::ops::Range;
 
 use super::adjectives::{self, Adjective};
 use super::evaluator::{Evaluator, Outcome};
 use super::outcome::{Matches, Member, Unmet, Why};
 use crate::models;
-use crate::pipeline::semantics::query::lexicon::{self, Kinship};
 use crate::pipeline::semantics::query::parse::ParsedQuery;
 use crate::scene::colors::row;
+use crate::scene::identity::lexicon::{self, Kinship};
 use crate::scene::identity::name_words;
 use crate::scene::{IdentityId, Level};
 
@@ -45,8 +46,8 @@ pub(super) fn called(all: &mut Evaluator<'_>, name: &str, at: &Range<usize>) -> 
 /// Any object that does not carry all others, or any part.
 pub(super) fn any(all: &mut Evaluator<'_>, parts: bool) -> Matches {
     let identities = all.scene.identities;
-    let stages = all.space.as_ref().filter(|s| s.shapes.are_known() && !all.with_stages);
-    let stages = stages.map(|s| s.stages()).unwrap_or_default();
+    let stages = all.space.filter(|s| s.shapes.are_known() && !all.with_stages);
+    let stages = stages.map(|s| s.stages().to_vec()).unwrap_or_default();
     let level = if parts { Level::Part } else { Level::Object };
     let wanted =
         identities.iter().filter(|(id, i)| i.level == level && !stages.contains(id) && all.scene.is_there(*id));
@@ -196,13 +197,7 @@ fn by_kind(all: &mut Evaluator<'_>, words: &[String]) -> Matches {
     for start in 0..words.len() {
         let (rest, kind) = words.split_at(start);
         let asked = kind.join(" ");
-        for (id, _) in identities.iter().filter(|(id, _)| all.accepts(*id)) {
-            let named = known.names(id).iter().map(|name| name.join(" "));
-            let Some((name, kinship)) =
-                named.clone().find_map(|name| Some((name.clone(), lexicon::is_a(&name, &asked)?)))
-            else {
-                continue;
-            };
+        for (id, name, kinship) in known.kinds().of(&asked).into_iter().filter(|(id, ..)| all.accepts(*id)) {
             if let Some(sure) = adjectives::described_by(all, id, rest, &asked) {
                 found.push(Member { sure: sure.min(KIND), rank: 3, ..member(id) });
                 told.push(match kinship {
@@ -281,9 +276,9 @@ fn not_there(all: &Evaluator<'_>, words: &[String], at: &Range<usize>) -> Unmet 
     }
     let unknown: Vec<String> = words.iter().filter(|w| !known.has(w) && row(w).is_none()).cloned().collect();
     let is_like = |word: &str| words.iter().any(|w| super::alike(word, w));
-    let near = identities.iter().map(|(id, _)| id).filter(|id| all.scene.is_there(*id));
-    let near: Vec<IdentityId> =
-        near.filter(|id| known.names(*id).iter().flatten().any(|w| is_like(w))).take(6).collect();
+    let near: BTreeSet<IdentityId> =
+        known.words().filter(|w| is_like(w)).flat_map(|w| known.with(w)).copied().collect();
+    let near: Vec<IdentityId> = near.into_iter().filter(|id| all.scene.is_there(*id)).take(6).collect();
     let list = |ids: &[IdentityId]| ids.iter().map(|id| identities.full_name(*id)).collect::<Vec<_>>().join(", ");
     let some: Vec<IdentityId> = identities
         .iter()

@@ -3,62 +3,119 @@
 //! A relation holds for a share of a thing, 0 to 1. Sides are those of the current view: left and right as in its
 //! picture, near and far along its level direction.
 
+use std::cell::{OnceCell, RefCell};
+use std::collections::HashMap;
+use std::rc::Rc;
+use std::sync::Arc;
+
 use glam::DVec3;
 
 use super::expression::Relation;
+use super::viewpoint::{UprightAxes, Viewpoint};
 use crate::scene::shapes::{SampledShape, SeenShapes};
+use crate::scene::support::Support;
 use crate::scene::{Identities, IdentityId, Level};
 
 /// Share from which a relation holds for sure, and from which it is a guess (docs/notes/queries.md).
 pub(crate) const HOLDS: [f64; 2] = [0.9, 0.75];
 
-/// Camera position, view direction and up direction of the scene, in world space.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Viewpoint {
-    /// Camera position.
-    pub eye: DVec3,
-    /// View direction; of any length.
-    pub forward: DVec3,
-    /// Up direction of the scene; of any length.
-    pub up: DVec3,
-}
-
-/// Upright unit axes of a view: right, up and ahead.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct UprightAxes {
-    /// Right.
-    pub right: DVec3,
-    /// Up direction of the scene.
-    pub up: DVec3,
-    /// Ahead, parallel to the ground.
-    pub ahead: DVec3,
-}
-
-impl Viewpoint {
-    /// Upright axes of the view. For a view straight up or down, or without a direction, the level axes are arbitrary.
-    pub fn frame(&self) -> UprightAxes {
-        let up = self.up.try_normalize().unwrap_or(DVec3::Z);
-        let level = self.forward.try_normalize().map(|f| f - up * f.dot(up)).filter(|l| l.length() > 1e-3);
-        let ahead = level.and_then(DVec3::try_normalize).unwrap_or_else(|| up.any_orthonormal_vector());
-        UprightAxes { right: ahead.cross(up), up, ahead }
-    }
-}
-
-/// Shapes of a scene with the view and the objects that carry others.
+/// Shapes of a scene with the view and what carries what. What is computed of a shape is kept.
 pub(crate) struct Space<'a> {
     pub(crate) identities: &'a Identities,
     pub(crate) shapes: &'a SeenShapes,
     pub(crate) view: Viewpoint,
     axes: UprightAxes,
+    support: OnceCell<Arc<Support>>,
+    along: RefCell<HashMap<(Along, IdentityId), Rc<Values>>>,
+}
+
+/// Value of a point.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+enum Along {
+    Right,
+    Up,
+    Ahead,
+    /// Place in the picture, to the right; there is none behind the camera.
+    Picture,
+}
+
+/// Values of a shape's points.
+struct Values {
+    /// Those of the points on its surface, the least first.
+    sorted: Vec<f64>,
+    /// Least and greatest of all.
+    span: (f64, f64),
+}
+
+impl Values {
+    /// Share of the values that are less than most of another's; with `reverse`, greater.
+    fn before(&self, other: &Self, reverse: bool) -> f64 {
+        /// Share of an anchor that may come before a thing that is before it.
+        const OVERLAP: f64 = 0.25;
+        let (own, n) = (&self.sorted, other.sorted.len());
+        let at = (OVERLAP * n as f64) as usize;
+        let Some(limit) = other.sorted.get(if reverse { n.wrapping_sub(at + 1) } else { at }) else { return 0.0 };
+        let less =
+            if reverse { own.len() - own.partition_point(|v| v <= limit) } else { own.partition_point(|v| v < limit) };
+        less as f64 / own.len().max(1) as f64
+    }
 }
 
 impl<'a> Space<'a> {
     pub(crate) fn new(identities: &'a Identities, view: Viewpoint) -> Self {
-        Self { identities, shapes: &identities.shapes, view, axes: view.frame() }
+        let (support, along) = (OnceCell::new(), RefCell::default());
+        Self { identities, shapes: &identities.shapes, view, axes: view.frame(), support, along }
     }
 
     pub(crate) fn axes(&self) -> &UprightAxes {
         &self.axes
+    }
+
+    fn support(&self) -> &Support {
+        self.support.get_or_init(|| self.shapes.support(self.identities, self.axes.up))
+    }
+
+    /// Objects that directly or indirectly carry at least half of the others: floor, table.
+    pub(crate) fn stages(&self) -> &[IdentityId] {
+        &self.support().stages
+    }
+
+    /// Returns whether `thing` rests on `anchor`, by way of at most `depth` things, the anchor included.
+    pub(crate) fn rests(&self, thing: IdentityId, anchor: IdentityId, depth: usize) -> bool {
+        self.support().rests(self.identities, thing, anchor, depth)
+    }
+
+    /// Values of a shape's points.
+    fn values(&self, along: Along, id: IdentityId) -> Option<Rc<Values>> {
+        if let Some(known) = self.along.borrow().get(&(along, id)) {
+            return Some(Rc::clone(known));
+        }
+        let (shape, axes) = (self.shapes.get(id)?, &self.axes);
+        let ahead = |p: &DVec3| (*p - self.view.eye).dot(axes.ahead);
+        let values: Vec<f64> = match along {
+            Along::Right => shape.points().iter().map(|p| (*p - self.view.eye).dot(axes.right)).collect(),
+            Along::Up => shape.points().iter().map(|p| p.dot(axes.up)).collect(),
+            Along::Ahead => shape.points().iter().map(ahead).collect(),
+            Along::Picture if shape.points().iter().any(|p| ahead(p) <= 1e-6) => Vec::new(),
+            Along::Picture => shape.points().iter().map(|p| (*p - self.view.eye).dot(axes.right) / ahead(p)).collect(),
+        };
+        let ends = (f64::INFINITY, f64::NEG_INFINITY);
+        let span = values.iter().fold(ends, |(low, high), x| (low.min(*x), high.max(*x)));
+        let mut sorted = values;
+        sorted.truncate(shape.spread().len());
+        sorted.sort_by(f64::total_cmp);
+        let values = Rc::new(Values { sorted, span });
+        self.along.borrow_mut().insert((along, id), Rc::clone(&values));
+        Some(values)
+    }
+
+    /// Share of a thing that comes before most of another.
+    fn before(&self, along: Along, thing: IdentityId, anchor: IdentityId, reverse: bool) -> Option<f64> {
+        Some(self.values(along, thing)?.before(&*self.values(along, anchor)?, reverse))
+    }
+
+    fn span(&self, along: Along, id: IdentityId) -> Option<(f64, f64)> {
+        Some(self.values(along, id)?.span)
     }
 
     /// Share of `thing` for which a relation to `anchor` holds; `None` without Gaussians, or for a thing and its own
@@ -76,189 +133,113 @@ impl<'a> Space<'a> {
             _ => {}
         }
         let (t, a) = (self.shapes.get(thing)?, self.shapes.get(anchor)?);
-        let (right, up, ahead) = (self.axes.right, self.axes.up, self.axes.ahead);
+        let is_over = || Some(self.over(thing, anchor, 0.0)?.max(self.over(anchor, thing, 0.0)?) >= 0.5);
         Some(match relation {
-            Relation::LeftOf => self.beside(t, a, right),
-            Relation::RightOf => self.beside(t, a, -right),
-            Relation::InFrontOf => before(t, a, |p| p.dot(ahead)),
-            Relation::Behind => before(t, a, |p| -p.dot(ahead)),
-            Relation::On => f64::from(u8::from(self.rests(thing, anchor, 4))),
+            Relation::LeftOf => self.beside(thing, anchor, false)?,
+            Relation::RightOf => self.beside(thing, anchor, true)?,
+            Relation::InFrontOf => self.before(Along::Ahead, thing, anchor, false)?,
+            Relation::Behind => self.before(Along::Ahead, thing, anchor, true)?,
+            Relation::On => share_if(self.rests(thing, anchor, 4)),
             Relation::Above => {
-                let lifted = (self.over(t, a, 0.5).max(self.over(a, t, 0.0))) >= 0.5;
-                if lifted { before(t, a, |p| -p.dot(up)) } else { 0.0 }
+                let lifted = self.over(thing, anchor, 0.5)?.max(self.over(anchor, thing, 0.0)?) >= 0.5;
+                if lifted { self.before(Along::Up, thing, anchor, true)? } else { 0.0 }
             }
-            Relation::Under => {
-                let lifted = self.over(t, a, 0.0).max(self.over(a, t, 0.0)) >= 0.5;
-                let carried = self.rests(anchor, thing, 1);
-                if carried {
-                    1.0
-                } else if lifted {
-                    before(t, a, |p| p.dot(up))
-                } else {
-                    0.0
-                }
-            }
-            Relation::In => self.inside(t, a).max(self.heaped(thing, t, anchor, a)),
+            Relation::Under if self.rests(anchor, thing, 1) => 1.0,
+            Relation::Under if is_over()? => self.before(Along::Up, thing, anchor, false)?,
+            Relation::Under => 0.0,
+            Relation::In => self.inside(thing, anchor)?.max(share_if(self.is_heaped(thing, anchor))),
             Relation::Near => near(t, a, 1.0),
             Relation::Around => near(t, a, 1.6),
             Relation::Touching => {
-                let size = t.bounds.radius().min(a.bounds.radius());
-                let touches = t.gap(a) <= 0.02 * size + 1e-9 || self.carries(t, a) || self.carries(a, t);
-                f64::from(u8::from(touches))
+                let (size, support) = (t.bounds.radius().min(a.bounds.radius()), self.support());
+                let carried = support.carries_itself(anchor, thing) || support.carries_itself(thing, anchor);
+                share_if(carried || t.gap(a) <= 0.02 * size + 1e-9)
             }
             Relation::PartOf => 0.0,
         })
     }
 
     /// Share of a thing that is left of another, seen from the camera: in the picture and in space.
-    fn beside(&self, t: &SampledShape, a: &SampledShape, right: DVec3) -> f64 {
-        let eye = self.view.eye;
-        let in_space = before(t, a, |p| (p - eye).dot(right));
-        let depth =
-            |s: &SampledShape| s.points().iter().map(|p| (*p - eye).dot(self.axes.ahead)).fold(f64::INFINITY, f64::min);
+    fn beside(&self, thing: IdentityId, anchor: IdentityId, right: bool) -> Option<f64> {
+        let both = [thing, anchor].map(|id| self.values(Along::Picture, id));
         // What is behind the camera has no side in its picture.
-        if depth(t).min(depth(a)) <= 1e-6 {
-            return 0.0;
+        if both.iter().flatten().any(|v| v.sorted.is_empty()) {
+            return Some(0.0);
         }
-        let in_picture = before(t, a, |p| (p - eye).dot(right) / (p - eye).dot(self.axes.ahead));
-        0.5 * (in_space + in_picture)
+        let [in_picture, in_space] = [Along::Picture, Along::Right].map(|a| self.before(a, thing, anchor, right));
+        Some(0.5 * (in_picture? + in_space?))
     }
 
     /// Share of a thing that is over the footprint of another, widened on each side by a share of its size.
-    fn over(&self, t: &SampledShape, a: &SampledShape, widened: f64) -> f64 {
-        let sides = [self.axes.right, self.axes.ahead].map(|axis| (axis, a.span(axis)));
-        let is_over = |p: &&DVec3| {
-            sides.iter().all(|(axis, (low, high))| {
-                let (x, more) = (p.dot(*axis), widened * (high - low));
-                x >= low - more && x <= high + more
-            })
+    fn over(&self, thing: IdentityId, anchor: IdentityId, widened: f64) -> Option<f64> {
+        let wide = |along| {
+            let (low, high) = self.span(along, anchor)?;
+            let more = widened * (high - low);
+            Some((low - more, high + more))
         };
-        share_of(t, is_over)
+        let (right, ahead) = (wide(Along::Right)?, wide(Along::Ahead)?);
+        let (x, y) = (self.span(Along::Right, thing)?, self.span(Along::Ahead, thing)?);
+        if x.1 < right.0 || x.0 > right.1 || y.1 < ahead.0 || y.0 > ahead.1 {
+            return Some(0.0);
+        }
+        let is_over = |p: &&DVec3| {
+            let p = **p - self.view.eye;
+            (right.0..=right.1).contains(&p.dot(self.axes.right))
+                && (ahead.0..=ahead.1).contains(&p.dot(self.axes.ahead))
+        };
+        Some(share_of(self.shapes.get(thing)?, is_over))
     }
 
     /// Share of a thing inside another one's footprint, if its bottom is below the other's rim.
-    fn inside(&self, t: &SampledShape, a: &SampledShape) -> f64 {
-        let (own, rim) = (t.span(self.axes.up), a.span(self.axes.up));
+    fn inside(&self, thing: IdentityId, anchor: IdentityId) -> Option<f64> {
+        let (own, rim) = (self.span(Along::Up, thing)?, self.span(Along::Up, anchor)?);
         let height = rim.1 - rim.0;
         let is_low = own.0 < rim.1 - 0.1 * height && own.0 > rim.0 - 0.1 * height && own.1 < rim.1 + 2.0 * height;
-        if is_low && t.bounds.radius() < a.bounds.radius() { self.over(t, a, 0.0) } else { 0.0 }
+        if is_low && self.is_smaller(thing, anchor) { self.over(thing, anchor, 0.0) } else { Some(0.0) }
     }
 
-    /// Returns 1 for a piece that lies on another piece inside: the pear on the apple in the bowl.
-    fn heaped(&self, thing: IdentityId, t: &SampledShape, anchor: IdentityId, a: &SampledShape) -> f64 {
+    fn is_smaller(&self, thing: IdentityId, than: IdentityId) -> bool {
+        let radius = |id| self.shapes.get(id).map(|s| s.bounds.radius());
+        radius(thing).zip(radius(than)).is_some_and(|(a, b)| a < b)
+    }
+
+    /// Returns whether a piece lies on another piece inside: the pear on the apple in the bowl.
+    fn is_heaped(&self, thing: IdentityId, anchor: IdentityId) -> bool {
+        let of = |id| self.identities.get(id).filter(|i| i.level == Level::Part).map(|i| i.parent);
         let parent = self.identities.get(thing).map(|i| i.parent);
-        let siblings =
-            self.identities.iter().filter(|(id, i)| Some(i.parent) == parent && ![thing, anchor].contains(id));
-        let is_under = |b: &SampledShape| self.inside(b, a) >= HOLDS[0] && self.carries(t, b);
-        let small = t.bounds.radius() < a.bounds.radius();
-        let lies = small
-            && siblings.filter(|(_, i)| i.level == Level::Part).filter_map(|(id, _)| self.shapes.get(id)).any(is_under);
-        f64::from(u8::from(lies))
-    }
-
-    /// Returns whether `t` stands or lies on top of `a` itself.
-    fn carries(&self, t: &SampledShape, a: &SampledShape) -> bool {
-        let up = self.axes.up;
-        let (top, bottom) = (a.span(up), t.span(up));
-        let (height, under) = (bottom.1 - bottom.0, top.1 - top.0);
-        let gap = bottom.0 - top.1;
-        // A table is not on the ball under it: both stand on the floor.
-        let is_higher = bottom.0 - top.0 > 0.25 * under && bottom.1 > top.1;
-        is_higher
-            && gap >= -0.35 * height - 0.05 * under
-            && gap <= 0.3 * height + 0.02 * under
-            && self.over(t, a, 0.02) >= 0.4
-    }
-
-    /// Returns whether `thing` rests on `anchor`, on a piece of it, or on something that does and carries little else.
-    pub(crate) fn rests(&self, thing: IdentityId, anchor: IdentityId, depth: usize) -> bool {
-        let Some(t) = self.shapes.get(thing) else { return false };
-        let pieces = self.identities.children(anchor).chain([anchor]);
-        let mut shapes = pieces.filter_map(|id| self.shapes.get(id));
-        if shapes.any(|a| self.carries(t, a)) {
-            return true;
-        }
-        if depth <= 1 {
-            return false;
-        }
-        let stages = self.stages();
-        let between = self
-            .identities
-            .iter()
-            .filter(|(id, i)| i.level == Level::Object && *id != thing && *id != anchor && !stages.contains(id));
-        between
-            .filter(|(id, _)| self.shapes.get(*id).is_some_and(|b| self.carries(t, b)))
-            .any(|(id, _)| self.rests(id, anchor, depth - 1))
-    }
-
-    /// Objects that directly or indirectly carry at least half of the others: floor, table.
-    pub(crate) fn stages(&self) -> Vec<IdentityId> {
-        self.shapes.stages(self.axes.up, || self.find_stages())
-    }
-
-    fn find_stages(&self) -> Vec<IdentityId> {
-        /// Largest footprints that are tried, and most things that are tried with them.
-        const TRIED: [usize; 2] = [12, 400];
-        let objects = self.identities.iter().filter(|(_, i)| i.level == Level::Object);
-        let objects: Vec<(IdentityId, &SampledShape)> =
-            objects.filter_map(|(id, _)| Some((id, self.shapes.get(id)?))).collect();
-        let footprint = |s: &SampledShape| {
-            let [a, b] = [self.axes.right, self.axes.ahead].map(|axis| s.span(axis));
-            (a.1 - a.0) * (b.1 - b.0)
+        let is_under = |b: &&IdentityId| {
+            of(**b).is_some_and(|of| Some(of) == parent)
+                && **b != anchor
+                && self.inside(**b, anchor).is_some_and(|share| share >= HOLDS[0])
         };
-        let mut widest = objects.clone();
-        widest.sort_by(|a, b| footprint(b.1).total_cmp(&footprint(a.1)));
-        widest.truncate(TRIED[0]);
-        let every = objects.len().div_ceil(TRIED[1]).max(1);
-        let tried: Vec<_> = objects.iter().step_by(every).collect();
-        let direct = |id: IdentityId, t: &SampledShape, on: IdentityId, a: &SampledShape| {
-            id != on
-                && (self.carries(t, a)
-                    || self.identities.children(on).filter_map(|p| self.shapes.get(p)).any(|a| self.carries(t, a)))
-        };
-        let mut carried: Vec<(IdentityId, Vec<IdentityId>)> = Vec::new();
-        for (on, a) in &widest {
-            let all = tried.iter().filter(|(id, t)| direct(*id, t, *on, a)).map(|(id, _)| *id).collect();
-            carried.push((*on, all));
-        }
-        let total = |on: IdentityId| {
-            let (mut seen, mut open) = (vec![on], vec![on]);
-            while let Some(next) = open.pop() {
-                let more = carried.iter().find(|(id, _)| *id == next).map(|(_, all)| all.clone()).unwrap_or_default();
-                more.into_iter().filter(|id| !seen.contains(id)).collect::<Vec<_>>().into_iter().for_each(|id| {
-                    seen.push(id);
-                    open.push(id);
-                });
-            }
-            seen.len() - 1
-        };
-        let half = (tried.len() as f64 * 0.5).max(2.5);
-        widest.iter().map(|(id, _)| *id).filter(|id| total(*id) as f64 >= half - 0.5).collect()
+        self.is_smaller(thing, anchor) && self.support().carriers(thing).iter().any(|b| is_under(&b))
     }
 
-    /// Share of a thing that lies between two others.
-    pub(crate) fn between(&self, thing: IdentityId, a: IdentityId, b: IdentityId) -> Option<f64> {
-        if [a, b].contains(&thing) || a == b {
+    /// Way between two things.
+    pub(crate) fn way(&self, a: IdentityId, b: IdentityId) -> Option<Way> {
+        if a == b {
             return None;
         }
-        let [t, a, b] = [thing, a, b].map(|id| self.shapes.get(id));
-        let (t, from, to) = (t?, a?.center(), b?.center());
-        let way = to - from;
-        let level = |v: DVec3| v - self.axes.up * v.dot(self.axes.up);
+        let reach = |id| {
+            let (x, y) = (self.span(Along::Right, id)?, self.span(Along::Ahead, id)?);
+            Some(0.25 * (x.1 - x.0 + y.1 - y.0))
+        };
+        let [from, to] = [a, b].map(|id| self.shapes.get(id).map(SampledShape::center));
+        let (from, way) = (from?, to? - from?);
+        let level = way - self.axes.up * way.dot(self.axes.up);
         // Of things one above the other, the way is upright.
-        let (way, flat) = if level(way).length() > 0.3 * way.length() { (level(way), true) } else { (way, false) };
+        let flat = (level.length() > 0.3 * way.length()).then_some(self.axes.up);
+        let way = if flat.is_some() { level } else { way };
         let length = way.length().max(1e-12);
-        let reach = |s: &SampledShape| {
-            let [x, y] = [self.axes.right, self.axes.ahead].map(|axis| s.span(axis));
-            0.25 * (x.1 - x.0 + y.1 - y.0)
-        };
-        let room = (0.5 * (reach(a?) + reach(b?)) + 0.18 * length).min(0.5 * length);
-        let is_between = |p: &&DVec3| {
-            let off = if flat { level(**p - from) } else { **p - from };
-            let along = off.dot(way) / length;
-            (0.0..=length).contains(&along) && (off - way * (along / length)).length() <= room
-        };
-        Some(share_of(t, is_between))
+        let room = (0.5 * (reach(a)? + reach(b)?) + 0.18 * length).min(0.5 * length);
+        Some(Way { ends: [a, b], from, direction: way / length, length, flat, room })
+    }
+
+    /// Share of a thing that lies on the way between two others.
+    pub(crate) fn between(&self, thing: IdentityId, way: &Way) -> Option<f64> {
+        let shape = self.shapes.get(thing).filter(|_| !way.ends.contains(&thing))?;
+        let is_near = way.has(shape.center(), shape.bounds.radius());
+        Some(if is_near { share_of(shape, |p| way.has(**p, 0.0)) } else { 0.0 })
     }
 
     /// Distance between two things; 0 if they touch.
@@ -267,19 +248,34 @@ impl<'a> Space<'a> {
     }
 }
 
+/// Way between two things, with the room at its sides.
+pub(crate) struct Way {
+    ends: [IdentityId; 2],
+    from: DVec3,
+    direction: DVec3,
+    length: f64,
+    /// Up direction, if heights do not count.
+    flat: Option<DVec3>,
+    room: f64,
+}
+
+impl Way {
+    /// Returns whether a point is on it, or nearer to it than `slack`.
+    fn has(&self, point: DVec3, slack: f64) -> bool {
+        let off = point - self.from;
+        let off = self.flat.map_or(off, |up| off - up * off.dot(up));
+        let along = off.dot(self.direction);
+        (-slack..=self.length + slack).contains(&along) && (off - self.direction * along).length() <= self.room + slack
+    }
+}
+
+fn share_if(holds: bool) -> f64 {
+    if holds { 1.0 } else { 0.0 }
+}
+
 fn share_of(shape: &SampledShape, fits: impl Fn(&&DVec3) -> bool) -> f64 {
     let all = shape.spread();
     all.iter().filter(fits).count() as f64 / all.len().max(1) as f64
-}
-
-/// Share of the points of `t` that come before most of `a`.
-fn before(t: &SampledShape, a: &SampledShape, value: impl Fn(DVec3) -> f64) -> f64 {
-    /// Share of an anchor that may come before a thing that is before it.
-    const OVERLAP: f64 = 0.25;
-    let mut after: Vec<f64> = a.spread().iter().map(|p| value(*p)).collect();
-    after.sort_by(f64::total_cmp);
-    let limit = after.get((OVERLAP * after.len() as f64) as usize).copied().unwrap_or(f64::NEG_INFINITY);
-    share_of(t, |p| value(**p) < limit)
 }
 
 /// Nearness of two things, 1 within half of `reach` times the size of the smaller one, falling to 0 at twice of it.
@@ -366,28 +362,12 @@ mod tests {
             (0.0, -1.0)
         );
         let space = Space::new(&all, view);
+        let between = |thing, a, b| space.between(thing, &space.way(a, b)?);
         assert_eq!(
-            (space.between(3, 1, 2), space.between(1, 3, 2), space.between(1, 1, 2)),
-            (Some(1.0), Some(0.0), None)
+            (between(3, 1, 2), between(1, 3, 2), between(1, 1, 2), between(1, 2, 2)),
+            (Some(1.0), Some(0.0), None, None)
         );
         assert!((space.gap(1, 2).unwrap_or(0.0) - 1.8).abs() < 1e-9 && space.stages().is_empty());
         assert_eq!(all.get(knob).map(|k| k.parent == NO_IDENTITY), Some(false));
-    }
-
-    #[test]
-    fn what_most_things_stand_on_is_a_stage() {
-        let mug = |x: f64| ([x, 0.0, 0.85], [0.1, 0.1, 0.1]);
-        let all = scene(&[
-            ([0.0, 0.0, -0.05], [9.0, 9.0, 0.1]),
-            ([0.0, 0.0, 0.4], [2.0, 1.0, 0.8]),
-            mug(-0.5),
-            mug(0.0),
-            mug(0.5),
-        ]);
-        let view = Viewpoint { eye: DVec3::new(0.0, -3.0, 1.0), forward: DVec3::Y, up: DVec3::Z };
-        assert_eq!(Space::new(&all, view).stages(), [1, 2]);
-        // Control: a tray with one of three things on it is none.
-        let all = scene(&[([0.0, 0.0, 0.4], [0.3, 0.3, 0.02]), ([0.0, 0.0, 0.46], [0.1; 3]), mug(3.0), mug(5.0)]);
-        assert!(Space::new(&all, view).stages().is_empty());
     }
 }

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use super::tokens::MAX_CHARS;
 use super::words::{LanguageWords, WordClass};
 use crate::models;
-use crate::pipeline::semantics::query::lexicon;
+use crate::scene::identity::lexicon;
 use crate::scene::identity::name_words::{SceneWords, singular};
 use crate::scene::{Identities, colors};
 

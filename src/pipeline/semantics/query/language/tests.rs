@@ -4,7 +4,7 @@ use glam::DVec3;
 
 use crate::pipeline::semantics::query::answer::QueryAnswer;
 use crate::pipeline::semantics::query::language::QueryPlace;
-use crate::pipeline::semantics::query::language::relations::Viewpoint;
+use crate::pipeline::semantics::query::language::viewpoint::Viewpoint;
 use crate::pipeline::semantics::query::localize::Answer;
 use crate::pipeline::semantics::query::query_engine::ask_by_name;
 use crate::pipeline::semantics::query::reading::QueryReading;

@@ -4,8 +4,8 @@ use super::{Grammar, LONGEST_NOUN};
 use crate::pipeline::semantics::query::language::expression::{Condition, Expression, SetOf};
 use crate::pipeline::semantics::query::language::tokens::number;
 use crate::pipeline::semantics::query::language::words::WordClass;
-use crate::pipeline::semantics::query::lexicon;
 use crate::scene::colors;
+use crate::scene::identity::lexicon;
 use crate::scene::identity::name_words::{SceneWords, singular, written};
 
 /// Returns the words from `i` to `k` as a noun with adjectives before it.

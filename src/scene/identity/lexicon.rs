@@ -1,7 +1,10 @@
 //! Words beyond the names of a scene: which words mean the same thing, and what is a kind of what, by WordNet.
 //! `tools/lexicon/build.py` made `assets/lexicon.z` and describes its sections. Needs no network.
 //!
-//! Words are in lower case and in the singular, as [`singular`](crate::scene::identity::name_words::singular) makes them, with a space between them.
+//! Words are in lower case and in the singular, as [`singular`](super::name_words::singular) makes them, with a space
+//! between them.
+
+pub(crate) mod kinds;
 
 use std::cmp::Ordering;
 use std::io::Read;
@@ -10,7 +13,7 @@ use std::sync::OnceLock;
 use flate2::read::ZlibDecoder;
 
 /// Relation of a name to an asked word.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) enum Kinship {
     /// The same thing in other words: a sofa for a couch.
     Same,
@@ -18,36 +21,55 @@ pub(crate) enum Kinship {
     KindOf,
 }
 
-/// Returns how a thing of this name is what was asked for, if it is. The last word of a name is its head: a red
-/// controller is a controller. What follows "of" or "in" does not count, nor does a last letter or number.
+/// Returns how a thing of this name is what was asked for, if it is.
 #[must_use]
 pub(crate) fn is_a(name: &str, asked: &str) -> Option<Kinship> {
-    if name == asked {
-        return Some(Kinship::Same);
-    }
-    let lexicon = Lexicon::get();
-    let (words, wanted) = (head(name), numbers(find(lexicon.words, asked).unwrap_or_default()));
+    let (lexicon, wanted) = (Lexicon::get(), concepts_of(asked));
+    clues(name).into_iter().find_map(|clue| match clue {
+        Clue::Text(text) => (text == asked).then_some(Kinship::Same),
+        Clue::Concepts(own) => lexicon.kinship(&own, &wanted),
+        Clue::Describing(own) => lexicon.kinship(&own, &wanted).map(|_| Kinship::KindOf),
+    })
+}
+
+/// What a name says of its thing.
+enum Clue {
+    /// Words that it may be called.
+    Text(String),
+    /// Concepts of these words.
+    Concepts(Vec<usize>),
+    /// Concepts of something that it is a kind of by a word before.
+    Describing(Vec<usize>),
+}
+
+/// Returns what a name says of its thing, the surest first. Its last word is its head: a red controller is a
+/// controller. What follows "of" or "in" does not count, nor does a last letter or number.
+fn clues(name: &str) -> Vec<Clue> {
+    let (lexicon, words) = (Lexicon::get(), head(name));
+    let mut all = vec![Clue::Text(name.to_owned())];
     let mut unknown = words.len();
     for at in 0..words.len() {
         let said = words[at..].join(" ");
-        if said == asked {
-            return Some(Kinship::Same);
-        }
-        let Some(listed) = find(lexicon.words, &said) else { continue };
+        let listed = find(lexicon.words, &said);
+        all.push(Clue::Text(said));
+        let Some(listed) = listed else { continue };
         unknown = unknown.min(at);
         let own = numbers(listed);
-        let found = lexicon.kinship(&own, &wanted);
-        if found.is_some() {
-            return found;
-        }
         // A hot dog is no dog; a teddy bear is a bear to those who look for one.
-        if !lexicon.shows_something(&own) {
+        let is_last = !lexicon.shows_something(&own);
+        all.push(Clue::Concepts(own));
+        if is_last {
             break;
         }
     }
     let first = words[..unknown].iter().filter_map(|word| find(lexicon.first, word));
-    let mut made = first.map(|listed| lexicon.kinship(&numbers(listed), &wanted));
-    made.any(|kinship| kinship.is_some()).then_some(Kinship::KindOf)
+    all.extend(first.map(|listed| Clue::Describing(numbers(listed))));
+    all
+}
+
+/// Returns the concepts of a word.
+fn concepts_of(word: &str) -> Vec<usize> {
+    numbers(find(Lexicon::get().words, word).unwrap_or_default())
 }
 
 /// Returns whether the lexicon has a word as a noun; another one may be a slip.
@@ -145,7 +167,7 @@ impl Lexicon {
 
 fn unpacked() -> String {
     let mut text = String::new();
-    let packed: &[u8] = include_bytes!("../../../../assets/lexicon.z");
+    let packed: &[u8] = include_bytes!("../../../assets/lexicon.z");
     let read = ZlibDecoder::new(packed).read_to_string(&mut text);
     debug_assert!(read.is_ok(), "a part of the program is broken: {read:?}");
     text

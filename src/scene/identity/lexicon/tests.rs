@@ -77,7 +77,7 @@ fn words_are_written_as_names_are() {
 
 #[test]
 fn the_file_is_small_and_whole() {
-    let packed: &[u8] = include_bytes!("../../../../../assets/lexicon.z");
+    let packed: &[u8] = include_bytes!("../../../../assets/lexicon.z");
     assert!((100_000..=1_000_000).contains(&packed.len()), "{} bytes", packed.len());
     let lexicon = Lexicon::get();
     let concepts = lexicon.concepts.len();
@@ -86,5 +86,5 @@ fn the_file_is_small_and_whole() {
     assert!(lines(lexicon.plurals) > 1_000 && lines(lexicon.spellings) > 500);
     let told = lexicon.words.lines().chain(lexicon.first.lines()).map(|line| line.split_once('\t').map_or("", |l| l.1));
     assert!(told.chain(lexicon.concepts.iter().copied()).flat_map(numbers).all(|number| number < concepts));
-    assert!(include_str!("../../../../../assets/lexicon.LICENSE.txt").contains("Princeton University"));
+    assert!(include_str!("../../../../assets/lexicon.LICENSE.txt").contains("Princeton University"));
 }
