@@ -71,12 +71,24 @@ pub(crate) struct MissedQuestion {
     pub(crate) got: String,
 }
 
+/// Sentence with its answer.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub(crate) struct AnsweredQuestion {
+    pub(crate) text: String,
+    /// Verdict: found, ambiguous, not found.
+    pub(crate) verdict: &'static str,
+    /// Numbers of the identities that are meant, or may be.
+    pub(crate) found: Vec<IdentityId>,
+}
+
 /// Result of an evaluation.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub(crate) struct LanguageResult {
     pub(crate) total: LanguageTally,
     pub(crate) by_kind: BTreeMap<String, LanguageTally>,
     pub(crate) missed: Vec<MissedQuestion>,
+    /// All sentences, but for those of the controls.
+    pub(crate) answers: Vec<AnsweredQuestion>,
     /// Answers to sentences with exchanged relations, whose truth is left as it was, and by shuffled names: both must
     /// fail. Only of generated sentences.
     pub(crate) controls: Vec<(String, LanguageTally)>,
@@ -185,6 +197,8 @@ fn asked(
         let answered = engine.ask(map, &question.text, LevelFilter::Auto)?;
         times.push(start.elapsed().as_secs_f64() * 1e3);
         let chosen = answered.as_ref().map(|a| a.chosen(1)).unwrap_or_default();
+        let verdict = answered.as_ref().map_or("not understood", |a| a.answer.verdict());
+        result.answers.push(AnsweredQuestion { text: question.text.clone(), verdict, found: chosen.clone() });
         let found: BTreeSet<String> = chosen.iter().map(|id| full_name(&map.identities, *id)).collect();
         let is_found = answered.as_ref().is_some_and(|a| matches!(a.answer, Answer::Found(_)));
         let is_open = answered.as_ref().is_none_or(|a| !matches!(a.answer, Answer::Found(_)));
@@ -206,7 +220,6 @@ fn asked(
             tally.open += usize::from(!right && !wrong);
         }
         if !right {
-            let verdict = answered.as_ref().map_or("not understood", |a| a.answer.verdict());
             let got = format!("{verdict}: {}", found.into_iter().collect::<Vec<_>>().join("; "));
             let wanted = match &question.truth {
                 KnownAnswer::All(truth) => truth.iter().cloned().collect::<Vec<_>>().join("; "),

@@ -110,7 +110,9 @@ pub(super) const RULES: &[Rule] = &[
     rule(&["segment"], &["no_measure"], |g| when(!g.has("out"), "without --out")),
     // Measures.
     rule(&["eval"], &["protocol", "query"], |g| when(!g.has("masks"), "without --masks")),
-    rule(&["eval"], RECIPE, |g| when(!g.has("masks"), "without --masks: nothing is asked for")),
+    rule(&["eval"], RECIPE, |g| {
+        when(!g.has_any(&["masks", "questions"]), "without --masks or --questions: nothing is asked for")
+    }),
     rule(&["eval", "batch eval"], RECIPE, |g| {
         let strokes = g.is("protocol", "strokes") || g.is("protocol", "corrections");
         when(strokes, "with this --protocol, which asks for nothing")
@@ -121,6 +123,9 @@ pub(super) const RULES: &[Rule] = &[
         when(g.has("masks") && strokes, "with this --protocol, which draws no images")
     }),
     rule(&["eval"], &["keep_borders"], |g| when(g.has("masks"), "with --masks, which compares no colors")),
+    rule(&["eval"], &["keep_borders", "pictures"], |g| {
+        when(g.has("questions"), "with --questions, which draws no images")
+    }),
     rule(&["eval"], &["keep_borders", "pictures"], |g| when(g.has("depth"), "with --depth, which compares no colors")),
     // Training.
     rule(&["train"], &["bind_anywhere", "host", "token_file"], |g| when(!g.has("serve"), "without --serve")),

@@ -196,6 +196,7 @@ const LINES: &[(&str, &[&str], &str)] = &[
     ("eval s --masks m {}", &["--keep-borders", "--query lamp", "--relevancy raw"], "eval s --masks m --pictures p"),
     ("eval s --masks m --protocol strokes {}", &["--by names", "--pictures p"], ""),
     ("eval s --masks m --protocol corrections {}", RECIPE, ""),
+    ("eval s --questions q {}", &["--pictures p", "--keep-borders"], "eval s --questions q --by names"),
     ("eval s --depth {}", &["--pictures p", "--keep-borders", "--by names"], "eval s --pictures p --keep-borders"),
     ("eval s --removal r {}", &["--by names", "--query lamp"], "eval s --removal r --pictures p"),
     ("train p {}", &["--host h", "--bind-anywhere", "--token-file f"], "train p --serve --host h --token-file f"),
@@ -365,4 +366,6 @@ fn what_is_said_names_the_option_and_what_it_needs() {
     assert_eq!(told("segment s lamp --out l.ply --format spz"), "--format has no effect without --all");
     assert_eq!(told("query s lamp --export out --truth t"), "--truth has no effect without --phrases");
     assert_eq!(told("agent s hi --model m"), "--model has no effect without --planner llm");
+    let asked = "--by has no effect without --masks or --questions: nothing is asked for";
+    assert_eq!(told("eval s --by names"), asked);
 }

@@ -9,6 +9,9 @@ use super::{Identities, IdentityId};
 /// Most characters of a name that are compared.
 const MOST_CHARS: usize = 300;
 
+/// Words that tell the pieces of a thing apart by their place.
+pub(crate) const SIDES: [&str; 9] = ["front", "back", "rear", "left", "right", "top", "bottom", "upper", "lower"];
+
 /// Returns the lower-case words of a name; a plural counts like its singular.
 pub(crate) fn words(text: &str) -> Vec<String> {
     written(text).map(|w| singular(&w)).collect()
@@ -126,6 +129,21 @@ impl SceneWords {
         self.with(first).iter().any(|id| self.names(*id).iter().any(has))
     }
 
+    /// Returns the identity and the number of a name that has these words, in the singular, with the sides at its end:
+    /// the "back wheel" may be called "wheel back".
+    pub(crate) fn reordered(&self, said: &[String]) -> Option<(IdentityId, usize)> {
+        let sorted = |words: &[String]| {
+            let mut words = words.to_vec();
+            words.sort_unstable();
+            words
+        };
+        let wanted = sorted(said);
+        let is_so = |name: &Vec<String>| name.len() == said.len() && sorted(name) == wanted;
+        self.with(said.first().filter(|word| SIDES.contains(&word.as_str()))?)
+            .iter()
+            .find_map(|id| Some((*id, self.names(*id).iter().position(is_so)?)))
+    }
+
     /// Words of all names in the singular, each as it is written.
     pub(crate) fn written(&self) -> impl Iterator<Item = (&str, &str)> {
         self.written.iter().map(|(single, written)| (single.as_str(), written.as_str()))
@@ -162,7 +180,11 @@ mod tests {
         );
         assert!(words.has("controllers") && words.has("a") && !words.has("lamp") && words.with("lamp").is_empty());
         assert_eq!(words.names(button), [vec!["button".to_owned(), "a".into()]]);
+        assert_eq!(words.reordered(&["a".into(), "button".into()]).or(words.reordered(&[])), None);
         assert!(words.written().any(|w| w == ("controller", "controllers")) && words.longest >= 4);
+        let wheel = all.add(Level::Part, red, vec!["wheel-back".into()]);
+        assert_eq!(all.words().reordered(&["back".into(), "wheel".into()]), Some((wheel, 0)));
+        assert_eq!(all.words().reordered(&["front".into(), "wheel".into()]), None);
         all.rename(button, "lamp");
         assert!(all.words().has("lamp"), "names that change are looked up anew");
     }

@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 use super::evaluator::{Evaluator, Outcome};
-use super::outcome::{Matches, Unmet, Why};
+use super::outcome::{Matches, Member, Unmet, Why};
 use super::relations::HOLDS;
 use crate::scene::IdentityId;
 use crate::scene::colors::{ColorVerdict, row, tone};
@@ -124,5 +124,13 @@ pub(super) fn described(
         });
         if either { each.fold(0.0, f64::max) } else { each.fold(1.0, f64::min) }
     };
-    Ok(found.judged(not, |m| sure(m.id)))
+    // What is partly of a color may be meant by "not red", and may not.
+    let partly = |m: &Member| not && (HOLDS[1]..HOLDS[0]).contains(&sure(m.id));
+    let unsure: Vec<Member> = found.members.iter().filter(|m| partly(m)).copied().collect();
+    let mut kept = found.judged(not, |m| sure(m.id));
+    if !kept.members.is_empty() {
+        kept.unclear |= !unsure.is_empty();
+        kept.members.extend(unsure.into_iter().map(|m| Member { sure: HOLDS[1], ..m }));
+    }
+    Ok(kept)
 }

@@ -54,12 +54,13 @@ pub(super) fn filtered(
                 let whole = identities.object_of(m.id);
                 let own = |a: &IdentityId| *a != whole && identities.object_of(*a) == whole;
                 let has_own = !by_parts && anchors[0].len() > 1 && anchors[0].iter().any(own);
-                let mut shares = anchors[0].iter().filter(|a| !has_own || own(a)).filter_map(|a| share(m, *a));
-                if all_of {
-                    let least = shares.try_fold(1.0, |least: f64, s| Some(least.min(s)));
-                    return least.filter(|_| !anchors[0].contains(&m.id)).unwrap_or(-1.0);
+                let shares = anchors[0].iter().filter(|a| !has_own || own(a)).filter_map(|a| share(m, *a));
+                match all_of {
+                    true if anchors[0].contains(&m.id) => -1.0,
+                    // Of nothing but its own pieces, a thing is on no side.
+                    true => shares.reduce(f64::min).unwrap_or(-1.0),
+                    false => shares.fold(-1.0, f64::max),
                 }
-                shares.fold(-1.0, f64::max)
             };
             let kept = found.judged(not, |m| holds(m));
             // Without shapes, only the parts of things are known.
@@ -106,16 +107,20 @@ pub(super) fn filtered(
         Condition::Among(_) => found.judged(not, |m| if anchors[0].contains(&m.id) { 1.0 } else { 0.0 }),
         Condition::Side { order, most } => order::on_side(all, found, (*order, *most != not), at)?,
     };
-    let kept = Matches { unclear, ..kept };
+    let kept = Matches { unclear: unclear || kept.unclear, ..kept };
     let text = format!("{}{}", all.said(&tail(of, at)), all.seen_from_here(is_of_view(is)));
-    let is_measure = matches!(is, Condition::Compared { .. } | Condition::Measured { .. } | Condition::Within { .. });
+    let tells_apart = match is {
+        Condition::Compared { .. } | Condition::Measured { .. } | Condition::Within { .. } => true,
+        Condition::Adjective(_) => !not,
+        _ => false,
+    };
     if kept.members.is_empty() {
-        all.failed_measure |= is_measure;
+        all.failed |= tells_apart && all.depth == 0;
         return Err(none_is(all, &before, &text, at));
     }
     let is_idle = kept.members.len() == before.members.len();
     all.idle += usize::from(is_idle);
-    all.idle_measure |= is_idle && is_measure;
+    all.idle_inside |= is_idle && tells_apart && all.depth > 0;
     all.step(&tail(of, at), text, &kept);
     Ok(kept)
 }

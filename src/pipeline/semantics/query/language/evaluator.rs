@@ -18,10 +18,10 @@ pub(super) struct Evaluator<'a> {
     pub(super) steps: Vec<QueryStep>,
     /// Number of conditions that removed nothing.
     pub(super) idle: usize,
-    /// True if a comparison removed nothing.
-    pub(super) idle_measure: bool,
-    /// True if a comparison removed all.
-    pub(super) failed_measure: bool,
+    /// True if a comparison or a color that is said of another thing than the one asked for removed nothing.
+    pub(super) idle_inside: bool,
+    /// True if a comparison or a color that is said of the thing asked for removed all.
+    pub(super) failed: bool,
     /// True once the view decided.
     pub(super) of_view: bool,
     /// Remarks on the way, such as "a kettle is a kind of pot".
@@ -46,7 +46,7 @@ impl<'a> Evaluator<'a> {
         looks: Option<&'a mut dyn Looks>,
     ) -> Self {
         let (steps, notes, looked, antecedent, depth, any_level) = (Vec::new(), Vec::new(), false, None, 0, false);
-        let (with_stages, idle, idle_measure, failed_measure, of_view) = (false, 0, false, false, false);
+        let (with_stages, idle, idle_inside, failed, of_view) = (false, 0, false, false, false);
         Self {
             scene,
             space,
@@ -60,8 +60,8 @@ impl<'a> Evaluator<'a> {
             any_level,
             with_stages,
             idle,
-            idle_measure,
-            failed_measure,
+            idle_inside,
+            failed,
             of_view,
         }
     }

@@ -268,8 +268,7 @@ impl Expression {
                 .split_whitespace()
                 .next_back()
                 .is_some_and(|w| name_words::singular(&w.to_lowercase()) != w.to_lowercase()),
-            SetOf::Union { of, either: true } => of.iter().any(Self::is_plural),
-            SetOf::Numbered(_) | SetOf::One(_) | SetOf::Nth { .. } => false,
+            SetOf::Union { either: true, .. } | SetOf::Numbered(_) | SetOf::One(_) | SetOf::Nth { .. } => false,
             SetOf::PartOf(of, _) | SetOf::Where { of, .. } | SetOf::Other(of) | SetOf::Except(of, _) => of.is_plural(),
             SetOf::Ranked { count, of, superlative, .. } => *count > 1 || (!superlative && of.is_plural()),
             SetOf::Nearest { count, .. } => *count > 1,

@@ -30,7 +30,7 @@ use glam::DVec3;
 
 use self::evaluator::Evaluator;
 use self::expression::{Asks, Expression, Sentence, SetOf};
-use self::outcome::{Matches, QueryStep, Unmet};
+use self::outcome::{Matches, Member, QueryStep, Unmet};
 use self::relations::Space;
 use self::viewpoint::Viewpoint;
 use super::parse::ParsedQuery;
@@ -115,12 +115,14 @@ pub(crate) struct Understood {
     pub(crate) of_view: bool,
     /// Number of conditions that removed nothing.
     idle: usize,
-    /// True if a comparison removed nothing.
-    idle_measure: bool,
-    /// True if a comparison removed all.
-    failed_measure: bool,
+    /// True if a comparison or a color that is said of another thing than the one asked for removed nothing.
+    idle_inside: bool,
+    /// True if a comparison or a color that is said of the thing asked for removed all.
+    failed: bool,
     /// True if it joins several sets.
     is_union: bool,
+    /// True if it leaves a choice between several sets.
+    is_choice: bool,
 }
 
 impl Understood {
@@ -242,13 +244,14 @@ fn answer<'a>(
 ) -> Understood {
     let mut evaluator = Evaluator::new(scene, space, text, looks);
     let found = evaluator.set(&sentence.set);
-    let Evaluator { steps, notes, looked, idle, idle_measure, failed_measure, of_view, .. } = evaluator;
+    let Evaluator { steps, notes, looked, idle, idle_inside, failed, of_view, .. } = evaluator;
     let plural = sentence.set.is_plural() || matches!(sentence.asks, Asks::Count | Asks::Names | Asks::Truth);
     let (found, unmet) = match found {
         Ok(found) => (found, None),
         Err(unmet) => (Matches::default(), Some(unmet)),
     };
     let is_union = matches!(sentence.set.set, SetOf::Union { .. });
+    let is_choice = matches!(sentence.set.set, SetOf::Union { either: true, .. });
     let (asks, said, readings) = (sentence.asks, None, 1);
     Understood {
         found,
@@ -262,9 +265,10 @@ fn answer<'a>(
         readings,
         of_view,
         idle,
-        idle_measure,
-        failed_measure,
+        idle_inside,
+        failed,
         is_union,
+        is_choice,
     }
 }
 
@@ -273,10 +277,11 @@ fn better(old: Understood, new: Understood) -> Understood {
     let rank = |u: &Understood| match &u.unmet {
         // "The box on the shelf taller than a meter" is said of the box, even if none is: not of the only shelf. But a
         // reading that misses a word of the sentence, or a piece, is no reason against one that finds a thing.
-        None if u.idle_measure => 3,
-        None if !u.is_ambiguous() => 0,
+        None if u.idle_inside => 3,
+        // A choice is not clear, and meant so.
+        None if !u.is_ambiguous() || u.is_choice => 0,
         None => 1,
-        Some(_) if u.failed_measure => 2,
+        Some(_) if u.failed => 2,
         Some(unmet) => 4 + unmet.why as usize,
     };
     let (a, b) = (rank(&old), rank(&new));
@@ -305,7 +310,8 @@ fn better(old: Understood, new: Understood) -> Understood {
     }
     let known: HashSet<IdentityId> = ids(&old).into_iter().collect();
     let more = new.found.settled().into_iter().filter(|m| !known.contains(&m.id));
-    let members = old.found.settled().into_iter().chain(more).collect();
+    // They fit their own reading each; which of them fits its words better says nothing.
+    let members = old.found.settled().into_iter().chain(more).map(|m| Member { rank: 0, ..m }).collect();
     Understood { found: Matches { members, unclear: true }, ..old }
 }
 

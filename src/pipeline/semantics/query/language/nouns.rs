@@ -175,9 +175,7 @@ fn by_heads(all: &Evaluator<'_>, words: &[String]) -> Matches {
 fn is_head(name: &[String], head: &str) -> bool {
     let thing = name.split(|w| w == "with" || w == "of").next().unwrap_or_default();
     let tells_apart = |w: &String| w.chars().count() == 1 || w.bytes().all(|b| b.is_ascii_digit());
-    let at_a_side = |w: &String| {
-        matches!(w.as_str(), "front" | "back" | "rear" | "left" | "right" | "top" | "bottom" | "upper" | "lower")
-    };
+    let at_a_side = |w: &String| name_words::SIDES.contains(&w.as_str());
     thing.last().is_some_and(|w| w == head)
         || thing.iter().rev().find(|w| !tells_apart(w) && !at_a_side(w)).is_some_and(|w| w == head)
 }

@@ -163,8 +163,11 @@ pub(super) fn compared(
     let space = all.space(at)?;
     let sign = if more { 1.0 } else { -1.0 };
     let of = |id: IdentityId| value(all, space, id, order);
+    let identities = all.scene.identities;
     let share = |m: &Member| {
         let Some(own) = of(m.id).filter(|_| !than.contains(&m.id)) else { return 0.0 };
+        // A thing is neither nearer nor farther than its own piece.
+        let apart = |other: &&IdentityId| !order.is_of_view() || !identities.are_related(m.id, **other);
         let over = |other: &IdentityId| {
             let theirs = of(*other)?;
             let slack = slack(space, m.id, order, own).max(slack(space, *other, order, theirs)).max(1e-12);
@@ -177,7 +180,7 @@ pub(super) fn compared(
                 0.0
             })
         };
-        than.iter().filter_map(over).fold(1.0, f64::min)
+        than.iter().filter(apart).filter_map(over).reduce(f64::min).unwrap_or(0.0)
     };
     let kept = found.judged(not, share);
     Ok(if not { kept.kept(|m| (!than.contains(&m.id)).then_some(m.sure)) } else { kept })

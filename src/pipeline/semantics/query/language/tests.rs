@@ -128,6 +128,43 @@ fn a_comparison_that_all_meet_is_met() {
     }
 }
 
+/// What a thing is compared with is not its own piece, and a comparison or color is said of the thing asked for.
+#[test]
+fn conditions_are_those_of_the_thing_that_is_asked_for() {
+    let mut all = Identities::default();
+    let mut boxes = vec![None];
+    let parts = ["body", "roof", "bumpers", "knob"];
+    for (name, x) in [("toy car", 0.0), ("truck", 5.0)] {
+        let whole = all.add(Level::Object, NO_IDENTITY, vec![name.into()]);
+        boxes.push(Some(Bounds { min: DVec3::new(x, 0.0, 0.0), max: DVec3::new(x + 1.0, 0.4, 0.5) }));
+        for (part, (low, high)) in parts.into_iter().zip([(0.0, 1.0), (0.3, 0.6), (0.05, 0.95), (0.48, 0.52)]) {
+            all.add(Level::Part, whole, vec![part.into()]);
+            let z = if part == "knob" { [0.46, 0.5] } else { [0.1, 0.4] };
+            boxes.push(Some(Bounds { min: DVec3::new(x + low, 0.0, z[0]), max: DVec3::new(x + high, 0.4, z[1]) }));
+        }
+    }
+    all.set_boxes(&boxes);
+    let view = Viewpoint { eye: DVec3::new(2.0, -9.0, 1.0), forward: DVec3::Y, up: DVec3::Z };
+    let place = QueryPlace { view: Some(view), meters: Some(1.0), ..QueryPlace::default() };
+    for (text, wanted) in [
+        ("the roof of the toy car which is left of the bumpers", "not found"),
+        ("the roof of the toy car which is right of the bumpers", "not found"),
+        ("the knob of the car farther away than the bumpers", "not found"),
+        ("the roof of the toy car which is left of the truck", "roof · toy car"),
+        ("the roof of the truck which is right of the toy car", "roof · truck"),
+        ("the knob of the toy car shorter than 10 cm", "knob · toy car"),
+        ("the knob of the toy car taller than 10 cm", "not found"),
+        ("the toy car or the truck", "ambiguous toy car"),
+        ("the bumpers of the truck or the roof of the toy car", "ambiguous bumpers · truck"),
+        ("cars or trucks", "all 2 toy car"),
+        ("the toy car, just its bumpers", "bumpers · toy car"),
+        ("is there a truck or a zebra", "truck"),
+    ] {
+        let answered = ask_by_name(&all, text, (LevelFilter::Auto, &place), &QueryConfig::default()).expect("words");
+        assert_eq!(told(&all, answered), wanted, "{text}");
+    }
+}
+
 #[test]
 fn slips_are_mended_word_by_word_and_words_of_their_own_are_not() {
     let (all, table) = data();

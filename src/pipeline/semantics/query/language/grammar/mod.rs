@@ -17,7 +17,7 @@ pub(crate) use self::sentence::sentences;
 use super::expression::{Expression, SetOf};
 use super::tokens::{Token, is_mark};
 use super::words::{LanguageWords, WordClass};
-use crate::scene::identity::name_words::{SceneWords, singular};
+use crate::scene::identity::name_words::{self, SceneWords, singular};
 use crate::scene::{Identities, LevelFilter};
 
 /// Most words of a sentence that are read.
@@ -61,6 +61,10 @@ impl<'a> Grammar<'a> {
 
     fn is(&self, class: WordClass, at: usize) -> bool {
         self.words.get(at).is_some_and(|word| self.vocabulary.is(class, word))
+    }
+
+    fn has_determiner(&self, at: &[usize]) -> bool {
+        at.iter().any(|at| self.is(WordClass::Determiner, *at))
     }
 
     fn make(&self, set: SetOf, from: usize, to: usize) -> Expression {
@@ -130,8 +134,12 @@ impl<'a> Grammar<'a> {
             }
         }
         let text = if is_quoted { &self.tokens[from].raw } else { self.text.get(self.at(from, j))? };
-        let whole = self.identities.called(text, LevelFilter::Auto);
-        (!whole.is_empty()).then(|| text.to_owned())
+        if !self.identities.called(text, LevelFilter::Auto).is_empty() {
+            return Some(text.to_owned());
+        }
+        let said = if (2..=LONGEST_NOUN).contains(&(j - from)) { name_words::words(text) } else { Vec::new() };
+        let (id, k) = self.known.reordered(&said).filter(|_| said.len() > 1)?;
+        self.identities.get(id)?.names.get(k).cloned()
     }
 
     /// Returns readings as several sets: "A and B", "A, B or C", "A except B".
@@ -152,8 +160,11 @@ impl<'a> Grammar<'a> {
                 return made;
             }
         }
-        let mut found = self.just_its(i, j);
-        found.extend(self.shared(i, j));
+        let just = self.just_its(i, j);
+        if !just.is_empty() {
+            return just;
+        }
+        let mut found = self.shared(i, j);
         for p in i + 1..j.saturating_sub(1) {
             let Some(n) = self.joint(p, j) else { continue };
             // "Red or blue controller" is read above.
@@ -171,7 +182,14 @@ impl<'a> Grammar<'a> {
                     }
                     _ => of.push(b),
                 }
-                found.push(self.make(SetOf::Union { of, either }, i, j));
+                // "Apples or pears": both, where there are both. "The apples or the pears" is a choice.
+                let is_any = either && of.iter().all(Expression::is_plural) && !self.has_determiner(&[i, p + n]);
+                let union = self.make(SetOf::Union { of, either }, i, j);
+                found.push(if is_any {
+                    self.make(SetOf::Every { of: Box::new(union), both: false }, i, j)
+                } else {
+                    union
+                });
             }
             found.extend(self.distributed(i, p, p + n, j, either));
             found.extend(self.of_one_whole(i, p, p + n, j, either));
