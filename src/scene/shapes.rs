@@ -7,7 +7,7 @@ use std::sync::{Arc, OnceLock};
 use glam::DVec3;
 use rayon::prelude::*;
 
-use super::support::Support;
+use super::support::{Standing, Support};
 use super::{Bounds, GaussianCloud, Identities, IdentityId, SemanticMap};
 
 /// Number of points spread evenly over an identity's Gaussians.
@@ -128,7 +128,7 @@ fn directions() -> [DVec3; DIRECTIONS] {
 }
 
 /// Returns two level unit axes and the unit up direction: the same for every view.
-pub(super) fn upright_axes(up: DVec3) -> Option<[DVec3; 3]> {
+fn upright_axes(up: DVec3) -> Option<[DVec3; 3]> {
     let up = up.try_normalize().unwrap_or(DVec3::Z);
     let axes = [DVec3::X, DVec3::Y, DVec3::Z].into_iter();
     let level = axes.min_by(|a, b| a.dot(up).abs().total_cmp(&b.dot(up).abs()))?;
@@ -244,7 +244,12 @@ impl SeenShapes {
 
     /// What carries what, for identities with these shapes.
     pub(crate) fn support(&self, identities: &Identities, up: DVec3) -> Arc<Support> {
-        let find = || Arc::new(Support::of(self, identities, up));
+        let find = || {
+            let axes = upright_axes(up).unwrap_or([DVec3::X, DVec3::Y, DVec3::Z]);
+            let place = |s: &SampledShape| Standing::of(s.spread(), axes.map(|axis| s.span(axis)), &axes);
+            let standing: Vec<Option<Standing>> = self.all.iter().map(|s| s.as_ref().map(place)).collect();
+            Arc::new(Support::of(&standing, identities))
+        };
         let (known_up, known) = self.support.get_or_init(|| (up, find()));
         if *known_up == up { Arc::clone(known) } else { find() }
     }

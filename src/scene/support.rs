@@ -4,7 +4,6 @@ use glam::DVec3;
 use rstar::primitives::{GeomWithData, Rectangle};
 use rstar::{AABB, RTree};
 
-use super::shapes::{SampledShape, SeenShapes, upright_axes};
 use super::{Identities, IdentityId, Level};
 
 /// Number of the largest footprints among which the things that carry most others are.
@@ -23,17 +22,17 @@ pub(crate) struct Support {
     pub(crate) stages: Vec<IdentityId>,
 }
 
-/// Upright box of a shape with its points on the ground.
-struct Standing {
+/// Upright box of a thing with its points on the ground.
+pub(super) struct Standing {
     /// Lowest and highest value along two level axes and upward.
     spans: [(f64, f64); 3],
     flat: Vec<[f64; 2]>,
 }
 
 impl Standing {
-    fn of(shape: &SampledShape, axes: &[DVec3; 3]) -> Self {
-        let flat = shape.spread().iter().map(|p| [p.dot(axes[0]), p.dot(axes[1])]).collect();
-        Self { spans: axes.map(|axis| shape.span(axis)), flat }
+    /// Takes the points of a surface and its lowest and highest values along two level axes and upward.
+    pub(super) fn of(points: &[DVec3], spans: [(f64, f64); 3], axes: &[DVec3; 3]) -> Self {
+        Self { spans, flat: points.iter().map(|p| [p.dot(axes[0]), p.dot(axes[1])]).collect() }
     }
 
     /// Rectangle on the ground, widened on each side by a share of its size.
@@ -64,12 +63,8 @@ impl Standing {
 }
 
 impl Support {
-    /// Computes what carries what.
-    pub(super) fn of(shapes: &SeenShapes, identities: &Identities, up: DVec3) -> Self {
-        let Some(axes) = upright_axes(up) else { return Self::default() };
-        let standing: Vec<Option<Standing>> = std::iter::once(None)
-            .chain(identities.iter().map(|(id, _)| shapes.get(id).map(|shape| Standing::of(shape, &axes))))
-            .collect();
+    /// Computes what carries what of these things, by number from 0.
+    pub(super) fn of(standing: &[Option<Standing>], identities: &Identities) -> Self {
         let there = || standing.iter().enumerate().filter_map(|(id, s)| Some((id as IdentityId, s.as_ref()?)));
         let corners = |[x, y]: [(f64, f64); 2]| ([x.0, y.0], [x.1, y.1]);
         let placed =

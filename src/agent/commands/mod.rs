@@ -51,9 +51,9 @@ impl Planner for Commands {
     fn start(&mut self, request: &str, context: &mut PlannerContext<'_>) {
         *self = Self::default();
         let identities = context.world.identities();
-        let question =
-            || language::is_question(request, identities).then(|| vec![CommandStep::Call(ToolCall::ask(request))]);
-        let Some(tasks) = parse(request, identities).or_else(question) else {
+        let search =
+            || language::is_search(request, identities).then(|| vec![CommandStep::Call(ToolCall::ask(request))]);
+        let Some(tasks) = parse(request, identities).or_else(search) else {
             self.refusal = Some(not_understood(request, context.world.identities()));
             return;
         };

@@ -63,26 +63,27 @@ pub(super) fn show_steps(ui: &mut Ui, queries: &mut Queries, asked: &Asked, sema
         return;
     }
     let mut relaxed = None;
-    egui::Grid::new("steps").num_columns(3).striped(true).show(ui, |ui| {
-        for step in steps {
-            let indent = "\u{2003}".repeat(step.depth.min(4));
-            ui.label(format!("{indent}{}", text::shortened(step.text.trim(), 60)));
-            let left = format!("{} left", step.left);
+    for step in steps {
+        let indent = "\u{2003}".repeat(step.depth.min(4));
+        let told = format!("{indent}{}", text::shortened(step.text.trim(), LONGEST));
+        let row = egui::Sides::new().shrink_left().truncate();
+        let what = |ui: &mut Ui| ui.label(told);
+        let effect = |ui: &mut Ui| {
+            let without = without(&asked.reading.text, step);
+            let button = ui.add_enabled(without.is_some(), egui::Button::new("\u{2715}").small());
+            button
+                .on_hover_text(match &without {
+                    Some(text) => format!("Leave out: asks \u{201c}{text}\u{201d}"),
+                    None => "Nothing would be left of the sentence".into(),
+                })
+                .clicked()
+                .then(|| relaxed = without);
             let color = if step.guess { theme::warning() } else { theme::weak() };
-            let told = ui.colored_label(color, if step.guess { format!("{left}, a guess") } else { left });
-            told.on_hover_text("Things that are left after this step");
-            match without(&asked.reading.text, step) {
-                Some(text) => {
-                    let button = ui.small_button("Leave out").on_hover_text(format!("Asks \u{201c}{text}\u{201d}"));
-                    if button.clicked() {
-                        relaxed = Some(text);
-                    }
-                }
-                None => drop(ui.label("")),
-            }
-            ui.end_row();
-        }
-    });
+            let left = format!("{} left{}", step.left, if step.guess { ", a guess" } else { "" });
+            ui.colored_label(color, left).on_hover_text("Things that are left after this step");
+        };
+        row.show(ui, what, effect);
+    }
     if *readings > 1 {
         ui.label(RichText::new(format!("Of {readings} readings of the sentence.")).small().color(theme::weak()));
     }

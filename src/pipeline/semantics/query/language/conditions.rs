@@ -108,7 +108,8 @@ pub(super) fn filtered(
         Condition::Side { order, most } => order::on_side(all, found, (*order, *most != not), at)?,
     };
     let kept = Matches { unclear: unclear || kept.unclear, ..kept };
-    let text = format!("{}{}", all.said(&tail(of, at)), all.seen_from_here(is_of_view(is)));
+    let said = all.said(&tail(of, at)).trim_end_matches(" that").trim_end_matches(" which").trim();
+    let text = format!("{said}{}", all.seen_from_here(is_of_view(is)));
     let tells_apart = match is {
         Condition::Compared { .. } | Condition::Measured { .. } | Condition::Within { .. } => true,
         Condition::Adjective(_) => !not,

@@ -145,17 +145,25 @@ pub(crate) fn read(text: &str, identities: &Identities) -> Vec<Sentence> {
 pub(crate) fn is_thing(text: &str, identities: &Identities) -> [bool; 2] {
     let all = tokens::tokens(text);
     let sets = grammar::Grammar::new(text, all.iter().collect(), identities).all();
+    let any = !sets.is_empty();
+    [any, sets.into_iter().any(|set| is_known(Sentence { asks: Asks::Things, set }, identities))]
+}
+
+fn is_known(sentence: Sentence, identities: &Identities) -> bool {
     let known = identities.words();
     let is_known =
         |phrase: &ParsedQuery| phrase.text.split(' ').all(|w| known.has(w) || crate::scene::colors::row(w).is_some());
-    let sentence = |set: Expression| [Sentence { asks: Asks::Things, set }];
-    let any = !sets.is_empty();
-    [any, sets.into_iter().any(|set| phrases(&sentence(set)).iter().all(is_known))]
+    phrases(&[sentence]).iter().all(is_known)
 }
 
-/// Returns whether a text is a question that is answered in words.
-pub(crate) fn is_question(text: &str, identities: &Identities) -> bool {
-    read(text, identities).first().is_some_and(|s| s.asks != Asks::Things)
+/// Returns whether a text asks for an answer in words, or asks in words of its own to see something that is known here:
+/// "I am looking for the mug".
+pub(crate) fn is_search(text: &str, identities: &Identities) -> bool {
+    let tokens = tokens::tokens(text);
+    let words: Vec<&str> = tokens.iter().map(|t| t.low.as_str()).collect();
+    let opens = words::LanguageWords::get().opener(&words).is_some();
+    let mut sentences = read(text, identities).into_iter();
+    sentences.next().is_some_and(|s| s.asks != Asks::Things || opens && is_known(s, identities))
 }
 
 /// Returns whether a phrase means all there is.
@@ -309,9 +317,12 @@ fn better(old: Understood, new: Understood) -> Understood {
         return if a.len() < b.len() { old } else { new };
     }
     let known: HashSet<IdentityId> = ids(&old).into_iter().collect();
-    let more = new.found.settled().into_iter().filter(|m| !known.contains(&m.id));
-    // They fit their own reading each; which of them fits its words better says nothing.
-    let members = old.found.settled().into_iter().chain(more).map(|m| Member { rank: 0, ..m }).collect();
+    // All of a plural fit alike, whatever the other reading finds.
+    let settled = |u: &Understood| {
+        let plural = u.plural;
+        u.found.settled().into_iter().map(move |m| Member { rank: if plural { 0 } else { m.rank }, ..m })
+    };
+    let members = settled(&old).chain(settled(&new).filter(|m| !known.contains(&m.id))).collect();
     Understood { found: Matches { members, unclear: true }, ..old }
 }
 
