@@ -143,17 +143,8 @@ impl Support {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::{Bounds, NO_IDENTITY};
-
-    fn scene(boxes: &[([f64; 3], [f64; 3])]) -> Identities {
-        let mut all = Identities::objects(boxes.len());
-        let cube = |(c, s): &([f64; 3], [f64; 3])| {
-            let (c, h) = (DVec3::from(*c), DVec3::from(*s) * 0.5);
-            Some(Bounds { min: c - h, max: c + h })
-        };
-        all.set_boxes(&[None].into_iter().chain(boxes.iter().map(cube)).collect::<Vec<_>>());
-        all
-    }
+    use crate::scene::NO_IDENTITY;
+    use crate::scene::identity::of_boxes as scene;
 
     #[test]
     fn things_rest_on_what_carries_them_by_way_of_others() {

@@ -279,6 +279,19 @@ impl Identities {
     }
 }
 
+/// Unnamed objects that are boxes, each with its center and its edges.
+#[cfg(test)]
+pub(crate) fn of_boxes(boxes: &[([f64; 3], [f64; 3])]) -> Identities {
+    use glam::DVec3;
+    let mut all = Identities::objects(boxes.len());
+    let cube = |(c, s): &([f64; 3], [f64; 3])| {
+        let (c, h) = (DVec3::from(*c), DVec3::from(*s) * 0.5);
+        Some(Bounds { min: c - h, max: c + h })
+    };
+    all.set_boxes(&[None].into_iter().chain(boxes.iter().map(cube)).collect::<Vec<_>>());
+    all
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

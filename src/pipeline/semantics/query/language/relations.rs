@@ -291,17 +291,8 @@ fn near(t: &SampledShape, a: &SampledShape, reach: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::{Bounds, NO_IDENTITY};
-
-    fn scene(boxes: &[([f64; 3], [f64; 3])]) -> Identities {
-        let mut all = Identities::objects(boxes.len());
-        let cube = |(c, s): &([f64; 3], [f64; 3])| {
-            let (c, h) = (DVec3::from(*c), DVec3::from(*s) * 0.5);
-            Some(Bounds { min: c - h, max: c + h })
-        };
-        all.set_boxes(&[None].into_iter().chain(boxes.iter().map(cube)).collect::<Vec<_>>());
-        all
-    }
+    use crate::scene::NO_IDENTITY;
+    use crate::scene::identity::of_boxes as scene;
 
     fn share(all: &Identities, view: Viewpoint, relation: Relation, thing: IdentityId, anchor: IdentityId) -> f64 {
         Space::new(all, view).share(relation, thing, anchor).unwrap_or(-1.0)
