@@ -94,9 +94,14 @@ fn chosen(harness: &Harness<'static, App>) -> [String; 2] {
 /// The window with unlabeled photos and the dialog with the methods open.
 fn asked(told: Told) -> Harness<'static, App> {
     let mut harness = Harness::builder().with_size([1200.0, 800.0]).with_max_steps(20).wgpu().build_eframe(|cc| {
-        let folders = Folders { data: "nowhere".into() };
+        let data = tempfile::tempdir().expect("a folder");
+        let folders = Folders { data: data.path().into() };
         let mut app = App::new(cc, folders, Some(Action::Open("photos".into()))).expect("threads");
-        app.tasks.script = Some(Box::new(move |info| Some(told.result(info))));
+        app.tasks.script = Some(Box::new(move |info| {
+            // The folder stays as long as the window does.
+            let _ = data.path();
+            Some(told.result(info))
+        }));
         app
     });
     let until = |harness: &mut Harness<'static, App>, done: &dyn Fn(&App) -> bool| {
