@@ -80,36 +80,43 @@ function listing(nav, identities, select, hide) {
     }
     nav.append(branch(0), nothing);
 
+    /** Shows only what `fits`, and what that is a part of; returns how many rows are left. */
+    function only(fits) {
+        let left = 0;
+        // Whether anything below fits by itself; what is below something that fits is there to be unfolded.
+        const visit = (parent, within) => {
+            let any = false;
+            for (const it of children.get(parent) ?? []) {
+                const own = within || fits(it);
+                const below = visit(it.id, own);
+                rows.get(it.id).item.hidden = !(own || below);
+                unfold(it.id, below);
+                left += +(own || below);
+                any ||= !within && (own || below);
+            }
+            return any;
+        };
+        visit(0, false);
+        return left;
+    }
+
     return {
-        /** Shows only what has a word for each of the query's beginnings in its full name, and what that is a part of. */
+        only: (ids) => only((it) => ids.includes(it.id)),
+        /** Shows only what has a word for each of the query's beginnings in its full name; returns whether anything has. */
         search(text) {
             const words = wordsOf(text).split(' ').filter(Boolean);
-            const fits = (it) => words.every((w) => wordsOf(it.full).includes(` ${w}`));
-            let found = 0;
-            // Whether anything below fits by itself; what is below something that fits is there to be unfolded.
-            const visit = (parent, within) => {
-                let any = false;
-                for (const it of children.get(parent) ?? []) {
-                    const own = within || fits(it);
-                    const below = visit(it.id, own);
-                    rows.get(it.id).item.hidden = !(own || below);
-                    unfold(it.id, below);
-                    found += +(own || below);
-                    any ||= !within && (own || below);
-                }
-                return any;
-            };
-            visit(0, words.length === 0);
+            const found = only((it) => words.every((w) => wordsOf(it.full).includes(` ${w}`))) > 0;
             if (identities.length) nothing.textContent = found ? '' : `Nothing is called “${text.trim()}”.`;
+            return found;
         },
-        mark(id, ancestors) {
-            for (const [other, { row }] of rows) {
-                row.classList.toggle('on', other === id);
-                row.querySelector('.name').setAttribute('aria-pressed', String(other === id));
+        /** Marks the rows of `ids` and unfolds what they are parts of. */
+        mark(ids, ancestors) {
+            for (const [id, { row }] of rows) {
+                row.classList.toggle('on', ids.includes(id));
+                row.querySelector('.name').setAttribute('aria-pressed', String(ids.includes(id)));
             }
-            if (!id) return;
-            ancestors.slice(1).forEach((whole) => unfold(whole, true));
-            rows.get(id).row.scrollIntoView({ block: 'nearest' });
+            ids.forEach((id) => ancestors(id).slice(1).forEach((whole) => unfold(whole, true)));
+            rows.get(ids[0])?.row.scrollIntoView({ block: 'nearest' });
         },
         hidden(isHidden) {
             for (const [id, { row, eye }] of rows) {

@@ -35,7 +35,8 @@ async function start() {
         return line;
     };
 
-    const state = { selected: 0, hidden: new Set(), flying: null };
+    // `asked` is the last answer, which "it" and Enter refer to.
+    const state = { selected: [], hidden: new Set(), flying: null, asked: null };
     const camera = { pose: null, distance: scene.distance, nearest: scene.distance * 1e-3 };
     let drawn = null;
     let player = null;
@@ -73,13 +74,18 @@ async function start() {
         };
         step(began);
     }
-    function flyTo(id) {
-        const it = byId.get(id);
+    /** Flies to a view of all `ids`; of one, from where a photo saw it best. */
+    function flyTo(ids) {
+        const all = ids.map((id) => byId.get(id)).filter(Boolean);
+        if (all.length === 0) return;
+        const middle = all.reduce((sum, it) => add(sum, it.center, 1 / all.length), [0, 0, 0]);
+        const reach = (it) => it.radius + Math.hypot(...add(it.center, middle, -1));
         const shorter = Math.min(1, canvas.clientWidth / canvas.clientHeight);
-        const distance = Math.max(camera.nearest, 2 * it.radius / (Math.sin(home().fov / 2) * shorter));
-        const forward = it.from ?? axis(camera.pose, 2);
-        const center = add(it.center, forward, -distance);
-        fly(looking(center, it.center, scene.up, home().fov, axis(camera.pose, 1)), distance);
+        const room = all.length === 1 ? 2 : 1.2;
+        const distance = Math.max(camera.nearest, room * Math.max(...all.map(reach)) / (Math.sin(home().fov / 2) * shorter));
+        const forward = (all.length === 1 && all[0].from) || axis(camera.pose, 2);
+        const center = add(middle, forward, -distance);
+        fly(looking(center, middle, scene.up, home().fov, axis(camera.pose, 1)), distance);
     }
     function reset() {
         fly(home(), scene.distance);
@@ -89,44 +95,79 @@ async function start() {
     const isHidden = (id) => ancestors(id).some((whole) => state.hidden.has(whole));
     function tint() {
         const bytes = new Uint8Array(256 * Math.ceil((most + 1) / 256) * 4);
-        bytes[3] = state.selected ? DIMMED : PLAIN;
+        const any = state.selected.length > 0;
+        bytes[3] = any ? DIMMED : PLAIN;
         for (const it of scene.identities) {
-            const line = ancestors(it.id);
-            const chosen = line.includes(state.selected);
-            const color = chosen ? vivid(byId.get(state.selected).color) : [0, 0, 0];
-            const how = isHidden(it.id) ? HIDDEN : !state.selected ? PLAIN : chosen ? TINTED : DIMMED;
+            const chosen = ancestors(it.id).find((id) => state.selected.includes(id));
+            const color = chosen ? vivid(byId.get(chosen).color) : [0, 0, 0];
+            const how = isHidden(it.id) ? HIDDEN : !any ? PLAIN : chosen ? TINTED : DIMMED;
             bytes.set([...color, how], 4 * it.id);
         }
         drawn?.tint(bytes);
     }
     const chip = document.getElementById('chosen');
-    function select(id) {
-        state.selected = id;
-        const it = byId.get(id);
-        chip.hidden = !it;
-        if (it) {
-            document.getElementById('chosen-name').textContent = it.full;
-            document.getElementById('chosen-count').textContent = `${it.count.toLocaleString('en-US')} Gaussians`;
-            chip.querySelector('.swatch').style.background = colorOf(vivid(it.color));
+    function select(ids) {
+        state.selected = ids.filter((id) => byId.has(id));
+        const all = state.selected.map((id) => byId.get(id));
+        chip.hidden = all.length === 0;
+        if (all.length) {
+            const count = all.reduce((sum, it) => sum + it.count, 0);
+            document.getElementById('chosen-name').textContent = all.length === 1 ? all[0].full : `${all.length} things`;
+            document.getElementById('chosen-count').textContent = `${count.toLocaleString('en-US')} Gaussians`;
+            chip.querySelector('.swatch').style.background = colorOf(vivid(all[0].color));
         }
-        list.mark(id, ancestors(id));
+        list.mark(state.selected, ancestors);
         tint();
     }
-    function hide(id) {
-        if (!state.hidden.delete(id)) state.hidden.add(id);
+    function hide(ids) {
+        for (const id of ids) if (!state.hidden.delete(id)) state.hidden.add(id);
         list.hidden(isHidden);
         tint();
     }
+    function goTo(ids) {
+        select(ids);
+        flyTo(ids);
+    }
+    /** Selects by hand, in place of what was asked for. */
+    function choose(ids) {
+        state.asked = null;
+        select(ids);
+    }
     const list = listing(document.getElementById('list'), scene.identities, (id) => {
-        select(id);
-        flyTo(id);
-    }, hide);
+        choose([id]);
+        flyTo([id]);
+    }, (id) => hide([id]));
+
+    // Questions
     const words = document.getElementById('words');
+    const place = document.getElementById('answer');
+    let [asks, kept] = [null, []];
     document.getElementById('search').hidden = scene.identities.length === 0;
-    words.oninput = () => list.search(words.value);
+    const question = (text) => asks?.({
+        text, eye: camera.pose.center, forward: axis(camera.pose, 2), last: state.talked ?? state.selected,
+    });
+    /** Answers while somebody types: shows what is found, or lists names that begin so. */
+    function answer() {
+        const text = words.value;
+        const told = text.trim() ? question(text) : null;
+        const before = state.asked;
+        if (!before) kept = state.selected;
+        state.asked = told?.found.length ? told.found : null;
+        const named = state.asked ? list.only(state.asked) : list.search(text);
+        place.hidden = !told || (!state.asked && named);
+        if (!place.hidden) {
+            showAnswer(place, text, told, (id) => byId.get(id)?.full ?? `#${id}`, (id) => goTo(state.asked = [id]));
+        }
+        // Without an answer, what was selected before is selected again.
+        if (state.asked || before) select(state.asked ?? kept);
+    }
+    words.onfocus = () => { state.talked = state.selected; };
+    words.oninput = answer;
     words.onkeydown = (e) => {
-        const first = e.key === 'Enter' && document.querySelector('#list li:not([hidden]) .name');
-        if (first) first.click();
+        if (e.key !== 'Enter') return;
+        if (state.asked) goTo(state.asked);
+        else document.querySelector('#list li:not([hidden]) .name')?.click();
+        state.talked = state.selected;
     };
 
     jump(home());
@@ -180,8 +221,10 @@ async function start() {
         };
         const object = largest(0);
         // Again on what is selected already: one step further in, and from the innermost out again.
-        const inner = ancestors(state.selected).includes(object) && object ? largest(state.selected) : 0;
-        select(inner || object);
+        const [one] = state.selected.length === 1 ? state.selected : [0];
+        const inner = ancestors(one).includes(object) && object ? largest(one) : 0;
+        const chosen = inner || object;
+        choose(chosen ? [chosen] : []);
     });
 
     const paths = [...scene.paths, aroundPath(scene.view, scene.distance, scene.up, 20)];
@@ -198,7 +241,7 @@ async function start() {
     };
     document.getElementById('keys').onclick = explain;
     document.getElementById('home').onclick = reset;
-    document.getElementById('chosen-clear').onclick = () => select(0);
+    document.getElementById('chosen-clear').onclick = () => choose([]);
     /** The camera as a file of the program has it. */
     const cameraFile = () => {
         const [width, height] = size();
@@ -212,10 +255,10 @@ async function start() {
         ' ': () => player.toggle(),
         '/': () => words.focus(),
         '?': explain,
-        Escape: () => (document.body.classList.contains('alone') ? document.body.classList.remove('alone') : select(0)),
+        Escape: () => (document.body.classList.contains('alone') ? document.body.classList.remove('alone') : choose([])),
         c: () => navigator.clipboard?.writeText(JSON.stringify(cameraFile())),
-        f: () => (state.selected ? flyTo(state.selected) : reset()),
-        h: () => state.selected && hide(state.selected),
+        f: () => (state.selected.length ? flyTo(state.selected) : reset()),
+        h: () => hide(state.selected),
         p: () => document.body.classList.toggle('alone'),
         r: reset,
     };
@@ -229,8 +272,17 @@ async function start() {
         e.preventDefault();
         return action?.();
     });
-    window.fmlgs = { camera: cameraFile, frames: drawn.frames, selected: () => state.selected };
+    window.fmlgs = { camera: cameraFile, frames: drawn.frames, selected: () => state.selected, name: (id) => byId.get(id).full };
     drawn.start();
+    try {
+        asks = await asking();
+    } catch (e) {
+        // Older browsers, or a damaged page: names are still searched.
+        console.warn(e);
+    }
+    words.placeholder = asks ? 'Ask: largest thing on the table' : 'Search names';
+    window.fmlgs.ask = asks && question;
+    if (words.value) answer();
 }
 
 start().catch((e) => {

@@ -41,7 +41,7 @@ pub(crate) use demo::DemoEncoder;
 pub use error::ModelError;
 pub(crate) use known::{KnownAnswer, KnownResult};
 pub use tile::IdentityCrop;
-pub(crate) use words::is_word;
+pub(crate) use words::{all_words, is_word};
 
 /// Folder of the models.
 pub(crate) fn folder() -> PathBuf {

@@ -4,8 +4,9 @@
 
 use std::sync::{Arc, OnceLock};
 
-use glam::DVec3;
+use glam::{DVec3, Vec3};
 use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
 
 use super::support::{Standing, Support};
 use super::{Bounds, GaussianCloud, Identities, IdentityId, SemanticMap};
@@ -180,13 +181,32 @@ impl Extent {
     }
 }
 
+/// Shape relative to an origin, as a page carries it: Gaussians have 32-bit positions, so nothing is lost.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub(crate) struct NearShape {
+    points: Vec<Vec3>,
+    spread: usize,
+    /// Lowest and highest corner.
+    bounds: [Vec3; 2],
+}
+
+impl From<NearShape> for SampledShape {
+    /// The origin is that of the world.
+    fn from(near: NearShape) -> Self {
+        let points: Vec<DVec3> = near.points.iter().map(|p| p.as_dvec3()).collect();
+        let [min, max] = near.bounds.map(|v| v.as_dvec3());
+        let spread = near.spread.min(points.len());
+        Self::measured(points, spread, Bounds { min, max })
+    }
+}
+
 /// Shapes of all identities, by number; empty until computed.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct SeenShapes {
     all: Arc<[Option<SampledShape>]>,
     /// Upright boxes for the up direction that was asked for first.
     extents: Arc<OnceLock<(DVec3, Vec<Option<Extent>>)>>,
-    /// What carries what, for the up direction that was asked for first.
+    /// Supports for the up direction that was asked for first.
     support: Arc<OnceLock<(DVec3, Arc<Support>)>>,
 }
 
@@ -194,6 +214,13 @@ impl PartialEq for SeenShapes {
     /// Always equal: shapes follow from the Gaussians.
     fn eq(&self, _: &Self) -> bool {
         true
+    }
+}
+
+impl FromIterator<Option<SampledShape>> for SeenShapes {
+    /// By number from 0.
+    fn from_iter<T: IntoIterator<Item = Option<SampledShape>>>(shapes: T) -> Self {
+        Self { all: shapes.into_iter().collect(), ..Self::default() }
     }
 }
 
@@ -217,12 +244,23 @@ impl SeenShapes {
                 whole.add(&piece);
             }
         }
-        Self { all: all.into(), ..Self::default() }
+        all.into_iter().collect()
     }
 
     /// Shapes of boxes, by number from 0.
     pub(crate) fn of_boxes(boxes: &[Option<Bounds>]) -> Self {
-        Self { all: boxes.iter().map(|b| b.map(SampledShape::of_box)).collect(), ..Self::default() }
+        boxes.iter().map(|b| b.map(SampledShape::of_box)).collect()
+    }
+
+    /// Shapes relative to an origin, by number from 0.
+    pub(crate) fn near(&self, origin: DVec3) -> Vec<Option<NearShape>> {
+        let near = |p: DVec3| (p - origin).as_vec3();
+        let shape = |s: &SampledShape| NearShape {
+            points: s.points.iter().map(|p| near(*p)).collect(),
+            spread: s.spread,
+            bounds: [near(s.bounds.min), near(s.bounds.max)],
+        };
+        self.all.iter().map(|s| s.as_ref().map(shape)).collect()
     }
 
     /// Returns whether shapes were computed.
@@ -242,7 +280,7 @@ impl SeenShapes {
         if *known_up == up { *known.get(id as usize)? } else { fit(self.all.get(id as usize)?) }
     }
 
-    /// What carries what, for identities with these shapes.
+    /// Finds what carries what, for identities with these shapes.
     pub(crate) fn support(&self, identities: &Identities, up: DVec3) -> Arc<Support> {
         let find = || {
             let axes = upright_axes(up).unwrap_or([DVec3::X, DVec3::Y, DVec3::Z]);

@@ -1,4 +1,4 @@
-//! What carries what: things that stand or lie on others, for one up direction and whatever the view.
+//! Support between things: what stands or lies on what, for one up direction and whatever the view.
 
 use glam::DVec3;
 use rstar::primitives::{GeomWithData, Rectangle};
@@ -109,7 +109,7 @@ impl Support {
         found
     }
 
-    /// What carries a thing directly.
+    /// Direct supports of a thing.
     pub(crate) fn carriers(&self, thing: IdentityId) -> &[IdentityId] {
         self.carriers.get(thing as usize).map(Vec::as_slice).unwrap_or_default()
     }

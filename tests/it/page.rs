@@ -161,7 +161,7 @@ fn the_page_shows_selects_and_plays_what_the_program_draws() {
     assert!(part.as_str().unwrap().ends_with(" · cookie jar"), "{part}");
     browser.key(ESCAPE);
     browser.key(ESCAPE);
-    assert_eq!(browser.run("return window.fmlgs.selected()"), 0);
+    assert_eq!(browser.run("return window.fmlgs.selected()"), json!([]));
 
     // A name in the list flies to its object and highlights it.
     browser.click("#list [title='teddy bear']");
@@ -210,6 +210,95 @@ fn the_page_shows_selects_and_plays_what_the_program_draws() {
     let list =
         browser.run("return document.getElementById('list').innerText || document.getElementById('list').textContent");
     assert!(list.as_str().unwrap().contains(HOSTILE), "{list}");
+    asks_nobody(browser);
+}
+
+/// Sentences of other tests, and relations between all sorts of objects.
+fn sentences() -> Vec<String> {
+    let told: toml::Value = toml::from_str(include_str!("../data/demo_questions.toml")).unwrap();
+    let first = |row: &toml::Value| row[0].as_str().unwrap().to_owned();
+    let mut all: Vec<String> = told["questions"].as_array().unwrap().iter().map(first).collect();
+    let said = |line: &str| serde_json::from_str::<Value>(line).unwrap()["say"].as_str().unwrap().to_owned();
+    all.extend(include_str!("../data/ordinary_sentences.jsonl").lines().map(said));
+    let things = ["kettle", "mug", "lamp", "teddy bear", "green book", "camera", "toy car", "cookie jar"];
+    for (i, a) in things.iter().enumerate() {
+        let b = things[(i * 3 + 1) % things.len()];
+        for relation in ["left of", "right of", "behind", "in front of", "next to", "on"] {
+            all.push(format!("the thing {relation} the {a}"));
+            all.push(format!("the {a} {relation} the {b}"));
+        }
+        all.extend([format!("everything but the {a}"), format!("the largest part of the {a}"), format!("{a} or {b}")]);
+    }
+    // A table of phrases has each once, without those that are remarks in it.
+    let mut known = std::collections::HashSet::new();
+    all.retain(|text| !text.trim().is_empty() && !text.starts_with('#') && known.insert(text.trim().to_lowercase()));
+    all
+}
+
+#[test]
+fn the_page_answers_as_the_program_does() {
+    let Some(browser) = Browser::open(SIZE[0], SIZE[1]) else { return };
+    let folder = folder();
+    let scene = demo_scene(folder.path()).to_str().unwrap().to_owned();
+    let shown = Shown { browser, folder, scene };
+    let browser = &shown.browser;
+    let page = shown.at("page.html");
+    fmlgs(&["export", &shown.scene, "--html", &page, "-q"]).ok();
+    browser.load(Path::new(&page));
+    browser.wait("it can be asked", "return typeof window.fmlgs.ask", &json!("function"));
+
+    let all = sentences();
+    std::fs::write(shown.at("phrases.txt"), all.join("\n")).unwrap();
+    let by_program = |camera: &str| {
+        let phrases = shown.at("phrases.txt");
+        let table = fmlgs(&["query", &shown.scene, "--phrases", &phrases, "--camera", camera, "--json", "-q"]);
+        let rows = table.json()["rows"].clone();
+        let told =
+            |row: &Value| (row["verdict"].as_str().unwrap().to_owned(), row["answer"].as_str().unwrap().to_owned());
+        rows.as_array().unwrap().iter().map(told).collect::<Vec<_>>()
+    };
+    // In the page's words, what the program says of the same view.
+    let by_page = |text: &String| {
+        let answer = browser.run(&format!("return window.fmlgs.ask({})", json!(text)));
+        let found = answer["found"].as_array().cloned().unwrap_or_default();
+        let names = format!("return {}.map((id) => window.fmlgs.name(id)).join('; ')", json!(found));
+        let verdict = if found.is_empty() {
+            "not found"
+        } else if answer["ambiguous"] == json!(true) {
+            "ambiguous"
+        } else {
+            "found"
+        };
+        (verdict.to_owned(), browser.run(&names).as_str().unwrap().to_owned())
+    };
+    let (told, other) = (by_program(&shown.camera()), by_program("9"));
+    let paged: Vec<_> = all.iter().map(by_page).collect();
+    assert_eq!((told.len(), other.len()), (all.len(), all.len()));
+    let differing = |program: &[(String, String)]| {
+        let rows = all.iter().zip(program).zip(&paged);
+        // What is not found has offers, which are no answers.
+        let same = |a: &(String, String), b: &(String, String)| a.0 == b.0 && (a.0 == "not found" || a.1 == b.1);
+        rows.filter(|((_, a), b)| !same(a, b)).map(|(text, b)| format!("{text:?}, page: {b:?}")).collect::<Vec<_>>()
+    };
+    println!("{} sentences, {} of another view differ", all.len(), differing(&other).len());
+    assert!(all.len() > 150 && differing(&other).len() > 5, "{:#?}", differing(&other));
+    assert_eq!(differing(&told), Vec::<String>::new());
+
+    // What is typed is shown, with the words that are not understood underlined.
+    let ask = |text: &str| {
+        browser.run(&format!("words.value = {}; words.oninput();", json!(text)));
+        browser
+            .run("return document.getElementById('answer').hidden ? '' : document.getElementById('answer').innerText")
+    };
+    let told = ask("the smallest book on the table");
+    assert!(told.as_str().unwrap().starts_with("orange book"), "{told}");
+    assert_eq!(shown.text("chosen-name"), "orange book");
+    assert!(ask("both books").as_str().unwrap().starts_with("2 things"));
+    assert_eq!(browser.run("return window.fmlgs.selected().length"), 2);
+    ask("the mug left of the zzyzx");
+    assert_eq!(browser.run("return document.querySelector('#answer mark').textContent"), "zzyzx");
+    assert_eq!(browser.run("return window.fmlgs.selected()"), json!([]));
+    assert_eq!(ask("teddy be"), "", "beginnings of names are listed");
     asks_nobody(browser);
 }
 

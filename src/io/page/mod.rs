@@ -1,7 +1,7 @@
 //! A scene as one HTML page that opens in any browser without a server and loads nothing from outside.
 //!
 //! `assets/page` has its text, style and scripts; the renderer is the PlayCanvas engine, made into one file by
-//! `tools/page`. Names and titles enter as escaped text or as JSON that no tag can end, and only scripts with a listed
+//! `tools/page`, and the language of questions is this program's, built as WebAssembly there. Names and titles enter as escaped text or as JSON that no tag can end, and only scripts with a listed
 //! checksum run.
 
 pub(crate) mod packed;
@@ -21,15 +21,17 @@ use crate::scene::IdentityId;
 const TEMPLATE: &str = include_str!("../../../assets/page/page.html");
 const STYLE: &str = include_str!("../../../assets/page/page.css");
 const RENDERER: &[u8] = include_bytes!("../../../assets/page/renderer.js");
+const LANGUAGE: &[u8] = include_bytes!("../../../assets/page/language.wasm");
 const LICENSE: &str = include_str!("../../../assets/page/renderer.LICENSE.txt");
 /// Scripts, joined into one in this order.
-const SCRIPTS: [&str; 8] = [
+const SCRIPTS: [&str; 9] = [
     include_str!("../../../assets/page/decode.js"),
     include_str!("../../../assets/page/pose.js"),
     include_str!("../../../assets/page/draw.js"),
     include_str!("../../../assets/page/pick.js"),
     include_str!("../../../assets/page/orbit.js"),
     include_str!("../../../assets/page/list.js"),
+    include_str!("../../../assets/page/ask.js"),
     include_str!("../../../assets/page/flight.js"),
     include_str!("../../../assets/page/page.js"),
 ];
@@ -94,6 +96,15 @@ pub(crate) struct PageScene {
     pub(crate) paths: Vec<PagePath>,
 }
 
+/// Data by which a page answers questions, besides the language.
+#[derive(Clone, Debug)]
+pub(crate) struct PageQuestions {
+    /// Names, colors and shapes, as JSON.
+    pub(crate) scene: Vec<u8>,
+    /// Words that people write, with spaces between them.
+    pub(crate) words: String,
+}
+
 /// Contents of a page besides its scripts.
 #[derive(Clone, Debug)]
 pub(crate) struct Page {
@@ -107,6 +118,8 @@ pub(crate) struct Page {
     pub(crate) gaussians: Vec<u8>,
     /// Identities as written by [`packed::identities`].
     pub(crate) identities: Vec<u8>,
+    /// Data for questions, if there are things to ask for.
+    pub(crate) asked: Option<PageQuestions>,
 }
 
 impl Page {
@@ -121,8 +134,13 @@ impl Page {
     /// Returns the text of the page.
     pub(crate) fn html(&self) -> std::io::Result<String> {
         let script = format!("(() => {{\n'use strict';\n{}}})();\n", SCRIPTS.join("\n"));
+        // A scene without objects is not asked.
+        let asked =
+            self.asked.as_ref().map(|asked| [&asked.scene[..], LANGUAGE, asked.words.as_bytes()].map(packed_text));
+        let [asked, language, words] =
+            asked.unwrap_or_else(|| [Ok(String::new()), Ok(String::new()), Ok(String::new())]);
         let fields = [
-            ("policy", policy(&script)),
+            ("policy", policy(&script, self.asked.is_some())),
             ("version", env!("CARGO_PKG_VERSION").to_owned()),
             ("title", escape_all_quotes(&self.title).into_owned()),
             ("facts", escape_all_quotes(&self.facts).into_owned()),
@@ -134,6 +152,9 @@ impl Page {
             ("gaussians", packed_text(&self.gaussians)?),
             ("identities", packed_text(&self.identities)?),
             ("renderer", packed_text(RENDERER)?),
+            ("asked", asked?),
+            ("language", language?),
+            ("dictionary", words?),
             ("script", script),
         ];
         Ok(filled(TEMPLATE, &fields))
@@ -141,10 +162,12 @@ impl Page {
 }
 
 /// Content security policy: allows the page's own script and style and the data that they make, and no connection.
-fn policy(script: &str) -> String {
+/// WebAssembly is allowed if the page `answers` questions.
+fn policy(script: &str, answers: bool) -> String {
+    let wasm = if answers { " 'wasm-unsafe-eval'" } else { "" };
     let sum = |text: &str| format!("'sha256-{}'", base64::encode(Sha256::digest(text.as_bytes())));
     format!(
-        "default-src 'none'; script-src {} blob:; worker-src blob:; style-src {}; img-src data:; base-uri 'none'; \
+        "default-src 'none'; script-src {}{wasm} blob:; worker-src blob:; style-src {}; img-src data:; base-uri 'none'; \
          form-action 'none'",
         sum(script),
         sum(STYLE)

@@ -50,6 +50,7 @@ fn page(title: &str, name: &str) -> Page {
         },
         gaussians: vec![1, 2, 3],
         identities: vec![1, 0, 0],
+        asked: Some(PageQuestions { scene: b"{}".to_vec(), words: "lamp mug".into() }),
     }
 }
 
@@ -59,6 +60,10 @@ fn a_page_carries_what_it_was_given() {
     assert!(html.starts_with("<!DOCTYPE html>") && html.contains("<title>The workshop</title>"));
     assert!(!html.contains("{{"), "every field is filled");
     assert_eq!((carried(&html, "gaussians"), carried(&html, "identities")), (vec![1, 2, 3], vec![1, 0, 0]));
+    assert_eq!((carried(&html, "asked"), carried(&html, "dictionary")), (b"{}".to_vec(), b"lamp mug".to_vec()));
+    assert!(carried(&html, "language").starts_with(b"\0asm"));
+    let unasked = Page { asked: None, ..page("The workshop", "mug") }.html().expect("made");
+    assert!(unasked.len() + 900_000 < html.len(), "a scene without objects carries no language");
     assert_eq!(carried(&html, "renderer"), RENDERER);
     let scene: serde_json::Value = serde_json::from_str(element(&html, "scene")).expect("JSON");
     assert_eq!((&scene["identities"][0]["name"], &scene["view"]["fov"]), (&"mug".into(), &0.8.into()));
@@ -83,7 +88,10 @@ fn the_browser_is_told_to_run_this_script_and_to_ask_for_nothing() {
     let html = page("a", "b").html().expect("made");
     let (_, policy) = html.split_once("Content-Security-Policy\" content=\"").expect("a policy");
     let policy = policy.split_once('"').expect("its end").0;
-    assert!(policy.starts_with("default-src 'none';") && !policy.contains("unsafe") && !policy.contains("http"));
+    let scripts = policy.replace("'wasm-unsafe-eval'", "");
+    assert!(policy.starts_with("default-src 'none';") && !scripts.contains("unsafe") && !policy.contains("http"));
+    let unasked = Page { asked: None, ..page("a", "b") }.html().expect("made");
+    assert!(!unasked.contains("unsafe-eval"), "WebAssembly is for questions");
     assert!(!policy.contains("connect-src"), "as little as by default: nothing");
     for (open, close, directive) in [("<script>", "</script>", "script-src"), ("<style>", "</style>", "style-src")] {
         let text = html.split_once(open).expect(open).1.split_once(close).expect(close).0;

@@ -7,13 +7,15 @@ use std::time::SystemTime;
 use glam::DVec3;
 
 use super::{JobError, Scene, export, video};
-use crate::io::page::{Page, PageIdentity, PagePath, PageScene, PageView, packed};
+use crate::io::page::{Page, PageIdentity, PagePath, PageQuestions, PageScene, PageView, packed};
 use crate::io::{IoError, files};
 use crate::math::format::{self, things};
 use crate::math::rotation::nearest_rotation;
+use crate::models;
 use crate::navigate::camera_spline::steps_of;
 use crate::navigate::{CameraSpline, Pose, Speed};
 use crate::pipeline::observer::{Observer, Ticker};
+use crate::pipeline::semantics::query::language::portable::PortableScene;
 use crate::pipeline::semantics::view_map::ViewMap;
 use crate::render::{RenderSettings, Renderer};
 use crate::scene::{
@@ -40,6 +42,8 @@ pub struct PageRequest {
     /// The photos' cameras.
     pub(crate) cameras: Vec<Camera>,
     pub(crate) home: HomeView,
+    /// Length of a scene unit in meters, if known.
+    pub(crate) meters: Option<f64>,
     pub(crate) settings: RenderSettings,
     /// Camera paths by name.
     pub(crate) paths: Vec<(String, CameraPath)>,
@@ -59,6 +63,7 @@ impl PageRequest {
             map,
             cameras: scene.views(),
             home: scene.home(),
+            meters: scene.meters_per_unit,
             settings: scene.settings.clone(),
             paths: scene.folder.as_deref().map(paths_in).unwrap_or_default(),
             out: out.into(),
@@ -126,6 +131,7 @@ fn page(request: &PageRequest, observer: &mut dyn Observer) -> Result<Page, JobE
         None => Vec::new(),
     };
     let identities = map.as_ref().map(|map| identities(cloud, map, &best)).unwrap_or_default();
+    let asked = map.as_deref().filter(|map| !map.identities.is_empty()).map(|map| asked(request, map)).transpose()?;
     let view = home.camera([4, 3]);
     let focus = home.bounds.center();
     let around = (focus - view.center).dot(view.forward());
@@ -139,6 +145,7 @@ fn page(request: &PageRequest, observer: &mut dyn Observer) -> Result<Page, JobE
         date: format::date(SystemTime::now()),
         gaussians: packed::encode(cloud, &order, settings.antialias).map_err(|e| JobError::Output(e.to_string()))?,
         identities: packed::identities(&identity_of, &order),
+        asked,
         scene: PageScene {
             identities,
             origin: cloud.origin.to_array(),
@@ -200,6 +207,15 @@ fn identities(cloud: &GaussianCloud, map: &SemanticMap, best: &[Option<DVec3>]) 
         })
     };
     all.iter().filter_map(made).collect()
+}
+
+/// Returns what the page needs to answer questions.
+fn asked(request: &PageRequest, map: &SemanticMap) -> Result<PageQuestions, JobError> {
+    let mut map = map.clone();
+    map.look_at(&request.cloud);
+    let scene = PortableScene::new(&map.identities, request.cloud.origin, request.home.up, request.meters);
+    let scene = serde_json::to_vec(&scene).map_err(|e| JobError::Output(e.to_string()))?;
+    Ok(PageQuestions { scene, words: models::all_words().join(" ") })
 }
 
 fn size(cloud: &GaussianCloud, i: usize) -> f64 {

@@ -34,6 +34,7 @@ fn request(out: &Path) -> PageRequest {
         cloud: Arc::new(cloud),
         map: Some(Arc::new(map)),
         cameras,
+        meters: Some(0.25),
         settings: RenderSettings { background: [0.1, 0.2, 0.3], ..RenderSettings::default() },
         paths: vec![("tour".into(), path)],
         out: out.into(),

@@ -98,6 +98,12 @@ impl Encoder for DemoEncoder {
 }
 
 impl DemoEncoder {
+    /// Words that it knows, with their forms in "es" and without a last "s".
+    pub(super) fn words(&self) -> impl Iterator<Item = String> {
+        let forms = |w: &String| [w.clone(), format!("{w}es"), w.trim_end_matches('s').to_owned()];
+        self.words.words.keys().flat_map(forms)
+    }
+
     fn look(&mut self, tile: &IdentityCrop) -> Result<Vec<f32>, ModelError> {
         let side = self.words.tile_side_px;
         if tile.side_px != side || tile.rgb.len() != side * side {

@@ -6,6 +6,8 @@ mod terms;
 
 use std::sync::Arc;
 
+use serde::{Deserialize, Serialize};
+
 use self::oklab::OkColor;
 use self::terms::{BROWN, SHADED_BROWN};
 pub(crate) use self::terms::{COLORS, ColorTone, row, tone};
@@ -52,7 +54,7 @@ impl ColorVerdict {
 }
 
 /// Colors of one identity, pieces included. All but the weight are sums by weight.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 struct ColorSums {
     /// Visible amount of its Gaussians: opacity times area.
     weight: f64,
@@ -98,8 +100,21 @@ impl ColorSums {
 }
 
 /// Colors of all identities, by number; empty until computed.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+#[serde(from = "Vec<ColorSums>", into = "Vec<ColorSums>")]
 pub(crate) struct SeenColors(Arc<[ColorSums]>);
+
+impl From<Vec<ColorSums>> for SeenColors {
+    fn from(sums: Vec<ColorSums>) -> Self {
+        Self(sums.into())
+    }
+}
+
+impl From<SeenColors> for Vec<ColorSums> {
+    fn from(colors: SeenColors) -> Self {
+        colors.0.to_vec()
+    }
+}
 
 impl PartialEq for SeenColors {
     /// Always equal: colors follow from the Gaussians.

@@ -32,7 +32,7 @@ pub(crate) fn is_a(name: &str, asked: &str) -> Option<Kinship> {
     })
 }
 
-/// What a name says of its thing.
+/// Clue of a name about its thing.
 enum Clue {
     /// Words that it may be called.
     Text(String),

@@ -126,6 +126,7 @@ pub(in crate::ui) fn page(app: &mut App) {
             map: map.as_deref().map(Arc::clone),
             cameras,
             home: scene.home.clone(),
+            meters: scene.meters_per_unit(),
             settings,
             paths,
             out,

@@ -2,7 +2,7 @@
 
 use super::grounds::without_courtesy;
 use super::language::expression::{Asks, Condition, Expression, Sentence, SetOf};
-use super::language::slips::{self, Pairs};
+use super::language::slips::Pairs;
 use super::language::{self};
 use super::parse::ParsedQuery;
 use super::recipe::{MatchBy, QueryConfig};
@@ -27,20 +27,16 @@ impl QueryReading {
     /// Reads a query about these identities; `None` if there is nothing in it.
     pub(crate) fn new(identities: &Identities, query: &str, recipe: &QueryConfig) -> Option<Self> {
         let query = query.trim();
-        let is_name = !identities.called(query, LevelFilter::Auto).is_empty();
         if recipe.match_by == MatchBy::Embedding {
             // Names are not used.
             let (text, sentences) = (query.to_owned(), language::read(query, &Identities::default()));
             let phrase = ParsedQuery::parse(query)?;
             return Some(Self { text, sentences, phrase, mended: Vec::new(), near: Vec::new() });
         }
-        let mended = match is_name {
-            true => slips::Mended { text: query.to_owned(), ..slips::Mended::default() },
-            false => slips::mend(identities, query),
-        };
+        let (mended, sentences) = language::hear(identities, query);
+        let is_name = || !identities.called(query, LevelFilter::Auto).is_empty();
         let phrase = ParsedQuery::parse(without_courtesy(&mended.text));
-        let phrase = phrase.or_else(|| is_name.then(|| ParsedQuery::undivided(query.to_lowercase())))?;
-        let sentences = language::read(&mended.text, identities);
+        let phrase = phrase.or_else(|| is_name().then(|| ParsedQuery::undivided(query.to_lowercase())))?;
         Some(Self { text: mended.text, sentences, phrase, mended: mended.slips, near: mended.near })
     }
 

@@ -146,13 +146,13 @@ pub(crate) enum SetOf {
     /// By number.
     Numbered(IdentityId),
     PartOf(Inner, Inner),
-    /// Those of a set for which a condition holds, or does not.
+    /// Members of a set for which a condition holds, or does not.
     Where {
         of: Inner,
         is: Condition,
         not: bool,
     },
-    /// Those with the most or the least of a quantity: `count` of them, after the `first`.
+    /// Members with the most or the least of a quantity: `count` of them, after the `first`.
     Ranked {
         of: Inner,
         order: OrderBy,
@@ -161,7 +161,7 @@ pub(crate) enum SetOf {
         count: usize,
         superlative: bool,
     },
-    /// Those nearest to another thing, or farthest from it.
+    /// Members nearest to another thing, or farthest from it.
     Nearest {
         of: Inner,
         to: Inner,
@@ -246,7 +246,7 @@ pub(crate) enum Asks {
     /// The things, by their names: "what is on the table".
     Names,
     Count,
-    /// Whether there are any, or whether something is so.
+    /// Answer yes or no: there are any, or something is so.
     Truth,
     Colors,
     Size(OrderBy),

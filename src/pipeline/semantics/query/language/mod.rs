@@ -17,6 +17,7 @@ pub(crate) mod grammar;
 pub(crate) mod nouns;
 pub(crate) mod order;
 pub(crate) mod outcome;
+pub(crate) mod portable;
 pub(crate) mod relations;
 pub(crate) mod said;
 pub(crate) mod slips;
@@ -32,6 +33,7 @@ use self::evaluator::Evaluator;
 use self::expression::{Asks, Expression, Sentence, SetOf};
 use self::outcome::{Matches, Member, QueryStep, Unmet};
 use self::relations::Space;
+use self::slips::Mended;
 use self::viewpoint::Viewpoint;
 use super::parse::ParsedQuery;
 use crate::scene::identity::name_words::singular;
@@ -139,6 +141,16 @@ pub(crate) fn read(text: &str, identities: &Identities) -> Vec<Sentence> {
     all.dedup();
     all.truncate(MOST_READINGS);
     all
+}
+
+/// Mends the slips of a text and returns its readings, the best first. A whole name has no slips.
+pub(crate) fn hear(identities: &Identities, text: &str) -> (Mended, Vec<Sentence>) {
+    let mended = match identities.called(text, LevelFilter::Auto).is_empty() {
+        true => slips::mend(identities, text),
+        false => Mended { text: text.to_owned(), ..Mended::default() },
+    };
+    let sentences = read(&mended.text, identities);
+    (mended, sentences)
 }
 
 /// Returns whether a text can be read as a set of things, and whether all its words are known in this scene.

@@ -28,7 +28,7 @@ impl Matches {
         Self { members, unclear: false }
     }
 
-    /// Those that the words fit best.
+    /// Members that the words fit best.
     pub(crate) fn settled(&self) -> Vec<Member> {
         let best = self.members.iter().map(|m| m.rank).min();
         self.members.iter().filter(|m| Some(m.rank) == best).copied().collect()

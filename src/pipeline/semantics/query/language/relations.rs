@@ -41,7 +41,7 @@ enum Along {
 
 /// Values of a shape's points.
 struct Values {
-    /// Those of the points on its surface, the least first.
+    /// Coordinates of the points on its surface, the least first.
     sorted: Vec<f64>,
     /// Least and greatest of all.
     span: (f64, f64),

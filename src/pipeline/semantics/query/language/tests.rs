@@ -188,3 +188,33 @@ fn slips_are_mended_word_by_word_and_words_of_their_own_are_not() {
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
     assert!(rows(&table, "compounds").iter().all(|row| mended(&all, row[0]).is_empty()));
 }
+
+#[test]
+fn a_name_with_its_words_in_another_order_goes_before_an_order() {
+    // From the eye, the nearest wheel is the back one.
+    let mut all = Identities::default();
+    let motorcycle = all.add(Level::Object, NO_IDENTITY, vec!["motorcycle".into()]);
+    let back = all.add(Level::Part, motorcycle, vec!["wheel-back".into()]);
+    let front = all.add(Level::Part, motorcycle, vec!["wheel-front".into()]);
+    let cube = |z: f64| Some(Bounds { min: DVec3::new(-0.1, -0.1, z), max: DVec3::new(0.1, 0.1, z + 0.2) });
+    all.set_boxes(&[None, Some(Bounds { min: DVec3::splat(-1.0), max: DVec3::splat(1.0) }), cube(-1.0), cube(0.8)]);
+    let view = Viewpoint { eye: DVec3::new(0.0, 0.0, -6.0), forward: DVec3::Z, up: -DVec3::Y };
+    let place = QueryPlace { view: Some(view), ..QueryPlace::default() };
+    let found = |text: &str| {
+        let answered = ask_by_name(&all, text, (LevelFilter::Auto, &place), &QueryConfig::default()).expect("words");
+        let mut ids = answered.chosen(1);
+        ids.sort_unstable();
+        ids
+    };
+    for text in [
+        "the back wheel and the front wheel of the motorcycle",
+        "the back wheel together with the front wheel of the motorcycle",
+        "the back wheel as well as the front wheel of the motorcycle",
+        "the front wheel or the back wheel of the motorcycle",
+        "back wheel and front wheel",
+    ] {
+        assert_eq!(found(text), [back, front], "{text}");
+    }
+    assert_eq!((found("the front wheel of the motorcycle"), found("the front wheel")), (vec![front], vec![front]));
+    assert_eq!(found("the nearest wheel"), [back], "an order that no name says");
+}

@@ -21,7 +21,8 @@ pub(super) fn read(g: &mut Grammar<'_>, i: usize, j: usize) -> Vec<Expression> {
     if !(is_amount && g.words.get(i + 1) == Some(&"of") && g.known.with(&amount).is_empty() && !is_of_the(g, i)) {
         found.extend(nouns(g, i, j));
     }
-    let is_name = i + 1 < j && g.known.follow(g.words[i], g.words[i + 1]);
+    // The name may have its words in another order: the front wheel is called "wheel-front".
+    let is_name = i + 1 < j && (g.known.follow(g.words[i], g.words[i + 1]) || g.whole_name(i, i + 2).is_some());
     if !found.is_empty() && is_name {
         return found;
     }
