@@ -167,6 +167,7 @@ pub(crate) fn edit_text(request: &EditRequest, all: &Identities) -> String {
     match request {
         EditRequest::Apply(Edit::Rename(id, name)) => format!("renamed {} to {}", all.label(*id), name.trim()),
         EditRequest::Apply(Edit::Merge(from, into)) => format!("merged {} into {}", all.label(*from), all.label(*into)),
+        EditRequest::Apply(Edit::Dissolve(id)) => format!("dissolved {}", all.label(*id)),
         EditRequest::Apply(Edit::Split(id)) => format!("split {}", all.label(*id)),
         EditRequest::Apply(Edit::AddPiece { of, name, .. }) => added(*of, name),
         EditRequest::Apply(Edit::Reshape { id, .. }) => format!("corrected {}", all.label(*id)),

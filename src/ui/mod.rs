@@ -26,6 +26,7 @@ pub(crate) mod keep_dialog;
 mod keys;
 pub(crate) mod labels;
 pub(crate) mod layout;
+pub(crate) mod object_menu;
 pub(crate) mod palette;
 pub(crate) mod panes;
 pub(crate) mod state;

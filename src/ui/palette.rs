@@ -4,7 +4,8 @@ use egui::{Align2, Key, Modifiers, RichText, ScrollArea, TextEdit};
 
 use super::keys;
 use super::layout::Layout;
-use super::theme;
+use super::{object_menu, theme};
+use crate::scene::{Identities, IdentityId};
 use crate::ui::actions::Action;
 
 #[derive(Default)]
@@ -25,8 +26,13 @@ impl Palette {
         self.open
     }
 
-    /// Draws the palette; returns the chosen action.
-    pub(crate) fn show(&mut self, ctx: &egui::Context, layout: &Layout) -> Option<Action> {
+    /// Draws the palette; returns the chosen action. Actions on the selection come first.
+    pub(crate) fn show(
+        &mut self,
+        ctx: &egui::Context,
+        layout: &Layout,
+        selection: Option<(&Identities, IdentityId)>,
+    ) -> Option<Action> {
         if !self.open {
             return None;
         }
@@ -53,18 +59,21 @@ impl Palette {
             if edit.changed() {
                 self.selected = 0;
             }
-            let found = matches(&self.query, layout);
+            let found = matches(&self.query, layout, selection);
             self.selected = self.selected.min(found.len().saturating_sub(1));
             if entered {
-                chosen = found.get(self.selected).cloned();
+                chosen = found.get(self.selected).map(|(action, _)| action.clone());
             }
             ui.add_space(4.0);
-            ScrollArea::vertical().max_height(380.0).auto_shrink([false, true]).show(ui, |ui| {
+            // The window remembers its last height, which the list must not be held to.
+            let height = (ctx.content_rect().height() - 220.0).clamp(120.0, 380.0);
+            let list = ScrollArea::vertical().max_height(height).min_scrolled_height(height);
+            list.auto_shrink([false, true]).show(ui, |ui| {
                 if found.is_empty() {
                     ui.weak("No matching action.");
                 }
-                for (i, action) in found.iter().enumerate() {
-                    let row = egui::Button::selectable(i == self.selected, title(action))
+                for (i, (action, title)) in found.iter().enumerate() {
+                    let row = egui::Button::selectable(i == self.selected, title)
                         .shortcut_text(keys::label(ui.ctx(), action))
                         .min_size(egui::vec2(ui.available_width(), 28.0));
                     let row = ui.add(row).on_hover_text(action.tooltip());
@@ -98,26 +107,33 @@ fn title(action: &Action) -> String {
 
 /// Actions whose titles hold every word of the query, those that begin with it first. A query that looks like a path
 /// gives only the action that opens it.
-fn matches(query: &str, layout: &Layout) -> Vec<Action> {
+fn matches(query: &str, layout: &Layout, selection: Option<(&Identities, IdentityId)>) -> Vec<(Action, String)> {
     let path = query.trim();
     if path.starts_with(['/', '.', '~']) || path.contains(":\\") {
         let home = path.strip_prefix("~/").and_then(|rest| Some(std::env::home_dir()?.join(rest)));
-        return vec![Action::Open(home.unwrap_or_else(|| path.into()))];
+        let open = Action::Open(home.unwrap_or_else(|| path.into()));
+        let title = title(&open);
+        return vec![(open, title)];
     }
     let query = path.to_lowercase();
     let words: Vec<&str> = query.split_whitespace().collect();
     let can_be_done = |a: &Action| !matches!(a, Action::TogglePane(pane) if !layout.shows(*pane));
-    let is_asked_for = |a: &Action| {
-        let title = format!("{} {}", title(a).to_lowercase(), other_words(a));
+    let is_asked_for = |(action, title): &(Action, String)| {
+        let title = format!("{} {}", title.to_lowercase(), other_words(action));
         words.iter().all(|w| title.contains(w))
     };
-    let mut found: Vec<Action> = Action::all().into_iter().filter(|a| can_be_done(a) && is_asked_for(a)).collect();
+    let of_selection = selection.map(|(all, id)| object_menu::named_actions(all, id)).unwrap_or_default();
+    let of_window = Action::all().into_iter().filter(can_be_done).map(|a| {
+        let title = title(&a);
+        (a, title)
+    });
+    let mut found: Vec<(Action, String)> = of_selection.into_iter().chain(of_window).filter(is_asked_for).collect();
     // The name of a pane is most likely a request for that pane.
     let is_pane = |a: &Action| match a {
         Action::ShowPane(pane) | Action::TogglePane(pane) => pane.text().to_lowercase().starts_with(&query),
         _ => false,
     };
-    found.sort_by_key(|a| !title(a).to_lowercase().starts_with(&query) && !is_pane(a));
+    found.sort_by_key(|(a, title)| !title.to_lowercase().starts_with(&query) && !is_pane(a));
     found
 }
 
@@ -184,10 +200,34 @@ fn sheet_grid(ui: &mut egui::Ui, title: &str, rows: &[(String, String)]) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::scene::{Level, NO_IDENTITY};
     use crate::ui::actions::Pane;
 
     fn found(query: &str) -> Vec<Action> {
-        matches(query, &Layout::default())
+        matches(query, &Layout::default(), None).into_iter().map(|(action, _)| action).collect()
+    }
+
+    #[test]
+    fn actions_on_the_selection_come_first_under_its_name() {
+        let mut all = Identities::default();
+        let mug = all.add(Level::Object, NO_IDENTITY, vec!["mug".into()]);
+        let titles = |query: &str| {
+            let found = matches(query, &Layout::default(), Some((&all, mug)));
+            found.into_iter().map(|(_, title)| title).collect::<Vec<_>>()
+        };
+        assert_eq!(titles("")[0], "Go there: mug");
+        assert_eq!(titles("").len(), found("").len() + object_menu::named_actions(&all, mug).len());
+        for (query, title) in [
+            ("move", "Move, turn or recolor: mug"),
+            ("recolor", "Move, turn or recolor: mug"),
+            ("fill mug", "Remove and fill: mug"),
+            ("correct", "Correct by clicks: mug"),
+            ("new part", "New part: mug"),
+            ("dissolve", "Dissolve: mug"),
+        ] {
+            assert_eq!(titles(query)[0], title, "{query}");
+        }
+        assert!(found("recolor").is_empty(), "nothing is selected");
     }
 
     #[test]

@@ -146,6 +146,7 @@ macro_rules! action_table {
                     Edit::Rename(_, name) => format!("Rename to {name}"),
                     Edit::Merge(from, into) => format!("Merge #{from} into #{into}"),
                     Edit::Split(id) => format!("Split #{id}"),
+                    Edit::Dissolve(id) => format!("Dissolve #{id}"),
                     Edit::AddPiece { name, .. } => format!("Add {name}"),
                     Edit::Reshape { id, .. } => format!("Correct the extent of #{id}"),
                 }, "Correct the segmentation; can be undone." => edit::apply(app, edit);
@@ -160,6 +161,8 @@ macro_rules! action_table {
                 => edit::correct(app, id);
             AddPainted: "Keep the selection", "Make what is selected an object or part, or the extent of the one that is corrected."
                 => edit::add_segment(app);
+            RenameThis(id: IdentityId): format!("Rename #{id}"), "Type a new name."
+                => { app.viewport.picking.select(Some(id)); edit::start_renaming(app) };
             Rename: "Rename", "Type a new name for the selected object or part.", "F2" => edit::start_renaming(app);
             Undo: "Undo", "Undo the last change to objects, visibility or the camera path.", "Ctrl+Z"
                 => edits::queue(app, EditStep::Undo);

@@ -41,7 +41,9 @@ pub(super) fn over_everything(app: &mut App, ctx: &egui::Context) {
     if ctx.input(|i| !i.raw.hovered_files.is_empty()) {
         dialogs::drop_hint(ctx);
     }
-    if let Some(action) = app.palette.show(ctx, &app.layout) {
+    let selection = app.state.semantics.as_ref().zip(app.viewport.picking.selected());
+    let selection = selection.map(|(map, id)| (&map.identities, id));
+    if let Some(action) = app.palette.show(ctx, &app.layout, selection) {
         app.ask(action);
     }
     shortcut_sheet(ctx, &mut app.sheet);

@@ -7,6 +7,7 @@ use egui::{
 
 use super::super::ctx::Ctx;
 use super::super::labels::{self, ScreenNames};
+use super::super::object_menu;
 use super::super::text_field::take_keyboard;
 use super::super::theme;
 use super::super::viewport::Viewport;
@@ -15,7 +16,6 @@ use super::PaneContents;
 use super::object_facts::{ListOrder, RowFacts};
 use super::object_thumbnails::ObjectThumbnails;
 use crate::math::format::things;
-use crate::navigate::target::Side;
 use crate::pipeline::semantics::lifting::edit::Edit;
 use crate::scene::{Identities, IdentityId, NO_IDENTITY};
 use crate::ui::actions::Action;
@@ -77,7 +77,7 @@ impl PaneContents for ObjectsPane {
                 cx.ask(Action::Isolate(None));
             }
             let new = Action::SegmentNew(Some(NO_IDENTITY));
-            if ui.button("Select an object\u{2026}").on_hover_text(new.tooltip()).clicked() {
+            if ui.button("New object\u{2026}").on_hover_text(new.tooltip()).clicked() {
                 cx.ask(new);
             }
             ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
@@ -248,44 +248,10 @@ impl Tree<'_> {
         }
     }
 
-    /// Draws the menu of corrections to an identity.
+    /// Draws the menu of actions on an identity.
     fn menu(&mut self, ui: &mut Ui, id: IdentityId, cx: &mut Ctx<'_>) {
         let all = self.identities;
-        let menu = ui.menu_button("\u{2026}", |ui| {
-            if ui.add(Button::new("Rename").shortcut_text("F2")).clicked() {
-                self.start_renaming(id);
-                ui.close();
-            }
-            let level = all.get(id).map(|i| i.level);
-            ui.menu_button("Merge into", |ui| {
-                ScrollArea::vertical().max_height(300.0).show(ui, |ui| {
-                    for (other, identity) in all.iter().filter(|(other, i)| *other != id && Some(i.level) == level) {
-                        // Parts of the same whole have short labels; others need the name of their whole.
-                        let same_whole = all.get(id).is_some_and(|i| i.parent == identity.parent);
-                        let text = if same_whole { all.label(other) } else { all.full_name(other) };
-                        if ui.button(text).clicked() {
-                            cx.ask(Action::Change(Edit::Merge(id, other)));
-                            ui.close();
-                        }
-                    }
-                });
-            });
-            for (action, text) in [
-                (Action::Change(Edit::Split(id)), "Split"),
-                (Action::Correct(id), "Correct by clicks\u{2026}"),
-                (Action::SegmentNew(Some(id)), "Select a new part\u{2026}"),
-                (Action::GoToTarget(id, Side::Best), "Go there"),
-                (Action::Isolate(Some(id)), "Isolate"),
-                (Action::Transform(id), "Transform\u{2026}"),
-                (Action::Remove(id), "Remove and fill"),
-                (Action::ExportTarget(id), "Export Gaussians\u{2026}"),
-            ] {
-                if ui.button(text).on_hover_text(action.tooltip()).clicked() {
-                    cx.ask(action);
-                    ui.close();
-                }
-            }
-        });
+        let menu = ui.menu_button("\u{2026}", |ui| object_menu::show(ui, all, id, cx));
         // The button stays while its menu is open, wherever the pointer is.
         match menu.inner {
             Some(()) => *self.menu_of = Some(id),

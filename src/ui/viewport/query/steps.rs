@@ -70,14 +70,11 @@ pub(super) fn show_steps(ui: &mut Ui, queries: &mut Queries, asked: &Asked, sema
         let what = |ui: &mut Ui| ui.label(told);
         let effect = |ui: &mut Ui| {
             let without = without(&asked.reading.text, step);
-            let button = ui.add_enabled(without.is_some(), egui::Button::new("\u{2715}").small());
-            button
-                .on_hover_text(match &without {
-                    Some(text) => format!("Leave out: asks \u{201c}{text}\u{201d}"),
-                    None => "Nothing would be left of the sentence".into(),
-                })
-                .clicked()
-                .then(|| relaxed = without);
+            let button = egui::Button::new("\u{2715}").small();
+            let hover = without.as_ref().map(|text| format!("Leave out: asks \u{201c}{text}\u{201d}"));
+            // A noun has no button, but the numbers stay in line.
+            let button = ui.add_visible(without.is_some(), button).on_hover_text(hover.unwrap_or_default());
+            button.clicked().then(|| relaxed = without);
             let color = if step.guess { theme::warning() } else { theme::weak() };
             let left = format!("{} left{}", step.left, if step.guess { ", a guess" } else { "" });
             ui.colored_label(color, left).on_hover_text("Things that are left after this step");
@@ -92,8 +89,11 @@ pub(super) fn show_steps(ui: &mut Ui, queries: &mut Queries, asked: &Asked, sema
     }
 }
 
-/// Sentence without the words of a step; `None` if nothing, or all of it, would be left out.
+/// Sentence without the words of a step; `None` for a noun, and if nothing, or all of it, would be left out.
 fn without(said: &str, step: &QueryStep) -> Option<String> {
+    if step.is_noun {
+        return None;
+    }
     let (before, after) = (said.get(..step.at.start)?, said.get(step.at.end..)?);
     let words = [before, after].join(" ");
     let left = words.split_whitespace().collect::<Vec<_>>().join(" ");
@@ -108,10 +108,10 @@ mod tests {
 
     #[test]
     fn a_step_is_left_out_with_its_words() {
-        let step = |at| QueryStep { at, text: String::new(), left: 1, guess: false, depth: 0 };
+        let step = |at| QueryStep { at, text: String::new(), left: 1, guess: false, depth: 0, is_noun: false };
         let said = "the mug left of the lamp";
         assert_eq!(without(said, &step(7..24)).as_deref(), Some("the mug"));
-        assert_eq!(without(said, &step(4..7)).as_deref(), Some("the left of the lamp"));
+        assert_eq!(without(said, &QueryStep { is_noun: true, ..step(4..7) }), None, "left of the lamp is no thing");
         assert_eq!(
             (without(said, &step(0..24)), without(said, &step(4..24)), without(said, &step(4..99))),
             (None, None, None)

@@ -21,6 +21,8 @@ pub enum Edit {
     Merge(IdentityId, IdentityId),
     /// Splits an identity into its connected components; if there is only one, into two halves.
     Split(IdentityId),
+    /// Ends an identity and its parts. Its Gaussians are its whole's, or nobody's.
+    Dissolve(IdentityId),
     /// Makes these Gaussians, as far as they belong to the identity, a new piece of it. Of nobody: a new object,
     /// whatever their labels were.
     AddPiece {
@@ -106,6 +108,14 @@ pub(crate) fn apply(map: &SemanticMap, cloud: &GaussianCloud, edit: &Edit) -> Re
             }
             // The photos that show each of the pieces were not recorded.
             new.findings.iter_mut().for_each(|f| f.forget_seen(*id));
+        }
+        Edit::Dissolve(id) => {
+            let whole = all.get(known(*id)?).map_or(NO_IDENTITY, |i| i.parent);
+            let inside = all.descendants(*id);
+            for i in map.members(*id) {
+                (new.identity_of[i], new.codes[i]) = (whole, all.codes(whole));
+            }
+            renumber(&mut new, |id| inside.get(id as usize) == Some(&true), None);
         }
         Edit::AddPiece { of, name, gaussians } => {
             let inside = if *of == NO_IDENTITY { Vec::new() } else { all.descendants(known(*of)?) };

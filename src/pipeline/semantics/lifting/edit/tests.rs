@@ -43,6 +43,20 @@ fn renaming_keeps_the_old_name() {
 }
 
 #[test]
+fn what_is_dissolved_is_its_wholes_or_nobodys() {
+    let (map, cloud) = scene();
+    let new = apply(&map, &cloud, &Edit::Dissolve(1)).expect("dissolved");
+    check(&new);
+    assert_eq!((new.identities.len(), new.sizes()), (2, vec![30, 30, 10]));
+    assert_eq!(new.identities.full_name(2), "eye · blue doll");
+    assert!(new.identities.removed.is_empty(), "it is not removed from the scene");
+    let new = apply(&map, &cloud, &Edit::Dissolve(2)).expect("a part goes back into its whole");
+    check(&new);
+    assert_eq!((new.identities.len(), new.sizes()[1]), (3, 30));
+    assert_eq!(apply(&map, &cloud, &Edit::Dissolve(9)), Err(EditError::Unknown(9)));
+}
+
+#[test]
 fn merged_identities_are_one_with_all_pieces() {
     let (map, cloud) = scene();
     for (from, into) in [(1, 3), (3, 1)] {

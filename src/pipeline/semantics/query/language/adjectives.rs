@@ -30,19 +30,19 @@ pub(super) fn class(all: &Evaluator<'_>, word: &str) -> Adjective {
     }
 }
 
-/// Sureness that all adjectives of `head` describe an identity; `None` if one does not.
-pub(super) fn described_by(all: &Evaluator<'_>, id: IdentityId, words: &[String], head: &str) -> Option<f64> {
-    let each = words.iter().enumerate().map(|(k, _)| describes(all, id, words, k, head));
+/// Sureness that all of these adjectives describe an identity; `None` if one does not.
+pub(super) fn described_by(all: &Evaluator<'_>, id: IdentityId, words: &[String]) -> Option<f64> {
+    let each = words.iter().enumerate().map(|(k, _)| describes(all, id, words, k));
     each.collect::<Option<Vec<f64>>>().map(|all| all.into_iter().fold(1.0, f64::min))
 }
 
-/// Adjectives of `head` that do not describe an identity.
-pub(super) fn undescribed(all: &Evaluator<'_>, id: IdentityId, words: &[String], head: &str) -> Vec<String> {
-    let fails = |k: &usize| describes(all, id, words, *k, head).is_none();
+/// Adjectives that do not describe an identity.
+pub(super) fn undescribed(all: &Evaluator<'_>, id: IdentityId, words: &[String]) -> Vec<String> {
+    let fails = |k: &usize| describes(all, id, words, *k).is_none();
     (0..words.len()).filter(fails).map(|k| words[k].clone()).collect()
 }
 
-fn describes(all: &Evaluator<'_>, id: IdentityId, words: &[String], k: usize, head: &str) -> Option<f64> {
+fn describes(all: &Evaluator<'_>, id: IdentityId, words: &[String], k: usize) -> Option<f64> {
     let identities = all.scene.identities;
     let known = identities.words();
     let word = &words[k];
@@ -52,8 +52,8 @@ fn describes(all: &Evaluator<'_>, id: IdentityId, words: &[String], k: usize, he
     let has = |id: IdentityId, word: &str| known.names(id).iter().flatten().any(|w| w == word);
     if let Some(color) = row(word) {
         // "Red controller button": the color is that of the controller.
-        let next = words.get(k + 1).map_or(head, String::as_str);
-        let owner = identities.ancestors(id).find(|i| has(*i, next)).unwrap_or(id);
+        let of_whole = words.get(k + 1).and_then(|next| identities.ancestors(id).find(|i| has(*i, next)));
+        let owner = of_whole.unwrap_or(id);
         let sure = color_of(all, owner, color);
         let named = || identities.ancestors(id).any(|i| has(i, word));
         return match sure {
@@ -119,8 +119,7 @@ pub(super) fn described(
     }
     let sure = |id: IdentityId| {
         let each = words.iter().enumerate().map(|(k, _)| {
-            describes(all, id, if either { &words[k..=k] } else { &words }, if either { 0 } else { k }, "")
-                .unwrap_or(0.0)
+            describes(all, id, if either { &words[k..=k] } else { &words }, if either { 0 } else { k }).unwrap_or(0.0)
         });
         if either { each.fold(0.0, f64::max) } else { each.fold(1.0, f64::min) }
     };

@@ -112,8 +112,13 @@ impl Evaluator<'_> {
             let within = |m: &Member| wholes_of.iter().any(|w| all.is_piece(m.id, w.id)).then_some(1.0);
             let found = pieces.clone().kept(within);
             if !found.members.is_empty() {
-                let owners =
-                    wholes_of.iter().filter(|w| found.members.iter().any(|m| all.is_piece(m.id, w.id))).count();
+                let owns = |whole: IdentityId| found.members.iter().any(|m| all.is_piece(m.id, whole));
+                // "The lids of the kettle and the mug": each that is listed has one.
+                let is_list = matches!(whole.set, SetOf::Union { either: false, .. });
+                if let Some(bare) = wholes_of.iter().find(|w| is_list && !owns(w.id)) {
+                    return Err(self.no_piece(piece, &[*bare], Vec::new(), e));
+                }
+                let owners = wholes_of.iter().filter(|w| owns(w.id)).count();
                 let unclear = found.unclear || wholes.unclear || (owners > 1 && !whole.is_plural());
                 let found = Matches { unclear, ..found };
                 self.step(&e.at, format!("of \u{201c}{}\u{201d}", self.said(&whole.at)), &found);

@@ -85,7 +85,14 @@ impl<'a> Evaluator<'a> {
     pub(super) fn step(&mut self, at: &Range<usize>, text: impl Into<String>, found: &Matches) {
         let left = found.settled();
         let guess = left.iter().any(|m| m.sure < HOLDS[0]);
-        self.steps.push(QueryStep { at: at.clone(), text: text.into(), left: left.len(), guess, depth: self.depth });
+        let (at, text, depth) = (at.clone(), text.into(), self.depth);
+        self.steps.push(QueryStep { at, text, left: left.len(), guess, depth, is_noun: false });
+    }
+
+    /// Records the step of a noun.
+    pub(super) fn noun_step(&mut self, at: &Range<usize>, text: impl Into<String>, found: &Matches) {
+        self.step(at, text, found);
+        self.steps.iter_mut().next_back().into_iter().for_each(|step| step.is_noun = true);
     }
 
     /// Evaluates within an expression: its steps stand deeper.

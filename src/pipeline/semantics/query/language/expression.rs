@@ -89,6 +89,8 @@ pub(crate) enum OrderBy {
     Height,
     /// Longest edge of the upright box.
     Length,
+    /// Longer horizontal edge.
+    Breadth,
     /// Shorter horizontal edge.
     Width,
     /// Shortest edge.

@@ -39,7 +39,7 @@ pub(super) fn called(all: &mut Evaluator<'_>, name: &str, at: &Range<usize>) -> 
         members.extend(others.map(|m| Member { rank: m.rank.max(1), ..m }));
     }
     let found = Matches::new(members);
-    all.step(at, format!("called \u{201c}{}\u{201d}", all.said(at)), &found);
+    all.noun_step(at, format!("called \u{201c}{}\u{201d}", all.said(at)), &found);
     Ok(found)
 }
 
@@ -117,11 +117,11 @@ pub(super) fn words(all: &mut Evaluator<'_>, words: &[String], plural: bool, at:
         } else {
             found
         };
-        all.step(at, format!("\u{201c}{}\u{201d}", all.said(at)), &found);
+        all.noun_step(at, format!("\u{201c}{}\u{201d}", all.said(at)), &found);
         return Ok(found);
     }
     if let Some(found) = looked_for(all, words, plural, at)? {
-        all.step(at, format!("\u{201c}{}\u{201d}, by embedding", all.said(at)), &found);
+        all.noun_step(at, format!("\u{201c}{}\u{201d}, by embedding", all.said(at)), &found);
         return Ok(found);
     }
     Err(not_there(all, words, at))
@@ -160,7 +160,7 @@ fn by_heads(all: &Evaluator<'_>, words: &[String]) -> Matches {
         if exact {
             found.push(Member { rank: 0, ..member(id) });
         } else if names.iter().any(|name| is_head(name, head))
-            && let Some(sure) = adjectives::described_by(all, id, rest, head)
+            && let Some(sure) = adjectives::described_by(all, id, rest)
         {
             // The "fruit bowl" is that rather than the bowl of it.
             let own = rest.iter().all(|w| row(w).is_some() || names.iter().flatten().any(|n| n == w));
@@ -196,7 +196,7 @@ fn by_kind(all: &mut Evaluator<'_>, words: &[String]) -> Matches {
         let (rest, kind) = words.split_at(start);
         let asked = kind.join(" ");
         for (id, name, kinship) in known.kinds().of(&asked).into_iter().filter(|(id, ..)| all.accepts(*id)) {
-            if let Some(sure) = adjectives::described_by(all, id, rest, &asked) {
+            if let Some(sure) = adjectives::described_by(all, id, rest) {
                 found.push(Member { sure: sure.min(KIND), rank: 3, ..member(id) });
                 told.push(match kinship {
                     Kinship::Same => format!("\u{201c}{asked}\u{201d} is another word for {name}."),
@@ -263,7 +263,7 @@ fn not_there(all: &Evaluator<'_>, words: &[String], at: &Range<usize>) -> Unmet 
     }
     if !heads.is_empty() {
         // The thing is there, but not so.
-        let beside = |id: &IdentityId| adjectives::undescribed(all, *id, rest, head);
+        let beside = |id: &IdentityId| adjectives::undescribed(all, *id, rest);
         let left = heads.iter().map(beside).min_by_key(Vec::len).unwrap_or_default();
         let strange = left.iter().any(|w| adjectives::class(all, w) == Adjective::Unknown);
         let why = if strange { Why::NotUnderstood } else { Why::Unknown };

@@ -20,6 +20,7 @@ pub(super) fn value(all: &Evaluator<'_>, space: &Space<'_>, id: IdentityId, orde
         OrderBy::Size => extent()?.volume(),
         OrderBy::Height => extent()?.height,
         OrderBy::Length => extent().map(|e| e.length.max(e.height))?,
+        OrderBy::Breadth => extent()?.length,
         OrderBy::Width => extent()?.width,
         OrderBy::Thickness => extent().map(|e| e.width.min(e.height))?,
         OrderBy::Up => {

@@ -101,4 +101,6 @@ pub(crate) struct QueryStep {
     pub(crate) guess: bool,
     /// Number of expressions around it.
     pub(crate) depth: usize,
+    /// True for a noun: without it, the rest of the sentence has nothing to be said of.
+    pub(crate) is_noun: bool,
 }

@@ -63,7 +63,8 @@ fn sizes(scene: &QueryScene<'_>, ids: &[IdentityId], order: OrderBy) -> String {
         match order {
             OrderBy::Height => format!("{name}: {} high.", length(e.height)),
             OrderBy::Length => format!("{name}: {} x {} x {}.", length(e.length), length(e.width), length(e.height)),
-            _ => format!("{name}: {} wide.", length(e.width)),
+            OrderBy::Breadth => format!("{name}: {} wide.", length(e.length)),
+            _ => format!("{name}: {} deep.", length(e.width)),
         }
     };
     ids.iter().take(MOST).map(of).collect::<Vec<_>>().join(" ")

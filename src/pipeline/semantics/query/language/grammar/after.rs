@@ -64,6 +64,8 @@ pub(super) fn after(
     let rest = g.words[at..j].to_vec();
     match rest.as_slice() {
         ["does", "not", "have", ..] | ["do", "not", "have", ..] => having(g, at + 3, j, true, &mut add),
+        ["has" | "have", "got", "no", ..] => having(g, at + 3, j, true, &mut add),
+        ["has" | "have", "got", ..] => having(g, at + 2, j, not, &mut add),
         ["has" | "have", "no", ..] => having(g, at + 2, j, true, &mut add),
         ["with", "no", ..] => having(g, at + 2, j, true, &mut add),
         ["with" | "has" | "have" | "having" | "containing" | "holding" | "contains" | "holds" | "carrying", ..] => {

@@ -294,6 +294,13 @@ fn ranked(g: &mut Grammar<'_>, i: usize, j: usize) -> Vec<Expression> {
 fn from_a_side(g: &mut Grammar<'_>, nth: usize, from: usize, i: usize, j: usize) -> Vec<Expression> {
     let found = (from + 1..j.saturating_sub(2)).find(|p| matches!(g.words[*p..*p + 2], ["from", "the"]));
     let Some(at) = found else { return Vec::new() };
+    // "The second mug, counting from the front".
+    let mut end = at;
+    while end > from + 1
+        && matches!(g.words[end - 1], "counting" | "counted" | "starting" | "seen" | "in" | "along" | ",")
+    {
+        end -= 1;
+    }
     let (order, most) = match g.words[at + 2] {
         "left" => (OrderBy::Right, false),
         "right" => (OrderBy::Right, true),
@@ -305,7 +312,7 @@ fn from_a_side(g: &mut Grammar<'_>, nth: usize, from: usize, i: usize, j: usize)
     };
     let (most, first) = if nth == 0 { (!most, 0) } else { (most, nth - 1) };
     // What follows is said of all of them.
-    let tokens = (from..at).chain(at + 3..j).map(|k| g.tokens[k]).collect();
+    let tokens = (from..end).chain(at + 3..j).map(|k| g.tokens[k]).collect();
     let inner = g.of(tokens).all();
     let make =
         |of: &Expression| SetOf::Ranked { of: Box::new(of.clone()), order, most, first, count: 1, superlative: true };

@@ -215,6 +215,8 @@ impl<'a> Grammar<'a> {
     /// Number of words that join two sets at `p`.
     fn joint(&self, p: usize, j: usize) -> Option<usize> {
         match self.words[p..j] {
+            [",", "and" | "or", "also" | "then", ..] => Some(3),
+            ["and" | "or" | "plus", "also" | "then", ..] => Some(2),
             [",", "and" | "or", ..] | ["as", "well", "as", ..] => Some(if self.words[p] == "as" { 3 } else { 2 }),
             ["together" | "along", "with", ..] => Some(2),
             ["," | "and" | "or" | "plus" | "&" | "+" | "nor", ..] => Some(1),
@@ -263,6 +265,8 @@ impl<'a> Grammar<'a> {
                 && !self.known.with(word).is_empty()
                 && !self.known.ends(word)
                 && self.identities.called(word, LevelFilter::Auto).is_empty()
+                // "The teddy or the lamp": another word for a teddy bear.
+                && self.known.kinds().of(word).is_empty()
         };
         self.vocabulary.order(word).is_some() || crate::scene::colors::row(word).is_some() || is_name()
     }

@@ -94,6 +94,9 @@ impl<'a> SentenceReader<'a> {
             ["what" | "which", "do" | "can", "you" | "we" | "i", "see", ..] if n > 4 => self.said_of_anything(4),
             ["of" | "among", "all" | "the", ..] if words.contains(&"which") => self.of_all(),
             ["which" | "what" | "whatever" | "who", ..] => self.which(),
+            // "The mug or the bottle, which is wider?"
+            [_, .., "which", _, _] | [_, .., "which", _, _, _] | [_, .., "which", _, _, _, _] => self.of_choices(),
+            ["between", ..] => self.said_of_anything(0),
             ["list" | "name" | "tell", ..] => {
                 let from = if words.get(1) == Some(&"me") { 2 } else { 1 };
                 self.plain(Asks::Names, from, n);
@@ -163,6 +166,23 @@ impl<'a> SentenceReader<'a> {
                     *superlative = true;
                 }
             });
+        }
+    }
+
+    /// Reads "the mug or the bottle, which is wider", "between the mug and the bottle, which is wider".
+    fn of_choices(&mut self) {
+        let words = self.whole.words.clone();
+        let (n, Some(which)) = (words.len(), words.iter().rposition(|w| *w == "which")) else { return };
+        let end = if words[which - 1] == "," { which - 1 } else { which };
+        let from = usize::from(matches!(words[0], "between" | "of" | "out"));
+        let Some(verb) = (which + 1..n).find(|k| matches!(words[*k], "is" | "has" | "are")) else { return };
+        let is_list = words[from..end].iter().any(|w| matches!(*w, "or" | "and"));
+        if from >= end || verb + 1 >= n || !is_list {
+            return;
+        }
+        let said = self.whole.tokens[verb + 1..].to_vec();
+        for of in self.whole.of(self.whole.tokens[from..end].to_vec()).all().iter().take(2) {
+            self.said_of(of, said.clone());
         }
     }
 
