@@ -4,14 +4,16 @@ use super::relation::Relation;
 use super::world::World;
 use crate::math::format::{self, capital, short};
 use crate::pipeline::semantics::query::language::relations::{HOLDS, Space};
+use crate::scene::identity::whole_names::BETWEEN;
 use crate::scene::{IdentityId, Level, NO_IDENTITY};
 
 /// Least share of the view for a thing to count as visible.
 pub(crate) const SEEN: f64 = 0.0005;
 
-/// Name with an article, such as "the kettle", or "#7" for an identity without a name.
+/// Name with an article, such as "the lid of the kettle", or "#7" for an identity without a name.
 pub(crate) fn the(world: &dyn World, id: IdentityId) -> String {
     let name = world.identities().full_name(id);
+    let name = name.replace(BETWEEN, " of the ");
     if name.starts_with('#') { name } else { format!("the {name}") }
 }
 

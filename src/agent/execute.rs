@@ -216,7 +216,7 @@ fn question(world: &dyn World, call: &ToolCall, policy: &Policy, id: Option<Iden
         }
         (Permission::ConfirmOverwrite | Permission::Free | Permission::Never, _) => None,
         (Permission::Confirm, ToolCall::Remove { .. }) => {
-            Some(format!("Remove {it}, into a scene of its own beside this one, which stays as it is? (yes or no)"))
+            Some(format!("Make a copy of this scene without {it}? (yes or no)"))
         }
         (Permission::Confirm, ToolCall::Rename { name, .. }) => Some(format!("Rename {it} to '{name}'? (yes or no)")),
         (Permission::Confirm, ToolCall::AskUser { .. }) => None,
@@ -358,15 +358,15 @@ fn act(
         }
         ToolCall::Unhide { .. } => {
             world.set_hidden(id, false).map_err(failed)?;
-            format!("{} is drawn again.", capital(&it))
+            format!("{} is visible again.", capital(&it))
         }
         ToolCall::ShowAll {} => {
             world.show_all().map_err(failed)?;
-            "Everything is drawn again.".into()
+            "Everything is visible again.".into()
         }
         ToolCall::Remove { .. } => {
             world.remove(id).map_err(failed)?;
-            format!("{} is removed in a scene of its own beside this one, which stays as it is.", capital(&it))
+            format!("Making a copy of this scene without {it}.")
         }
         ToolCall::Rename { name, .. } => {
             world.rename(id, name).map_err(failed)?;

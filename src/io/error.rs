@@ -44,7 +44,7 @@ pub enum IoError {
     OverBudget { path: PathBuf, what: &'static str, bytes: u64, limit: u64, remedy: &'static str },
     #[error("{path} ends early: {place} needs {need} more bytes, {have} are left")]
     Truncated { path: PathBuf, place: String, need: u64, have: u64 },
-    #[error("{path} claims {claimed} {what}, but what follows holds {possible} at most")]
+    #[error("{path} is cut off or damaged: {claimed} {what} announced, {possible} present at most")]
     Count { path: PathBuf, what: String, claimed: u64, possible: u64 },
     #[error("{path}, {place}: {reason}")]
     Syntax { path: PathBuf, place: String, reason: String },

@@ -83,7 +83,7 @@ impl SplatFormat {
         let mut all = Vec::new();
         let floats = self.rounding().is_none();
         if self == Self::Splat && cloud.sh_degree > 0 {
-            all.push("how colors change with the direction".to_owned());
+            all.push("view-dependent color".to_owned());
         }
         if !floats && !cloud.extras.is_empty() {
             let names: Vec<&str> = cloud.extras.iter().map(|e| e.name.as_str()).collect();
@@ -92,8 +92,8 @@ impl SplatFormat {
         let mode = match (self, cloud.render_mode) {
             (_, SplatRenderMode::Plain) | (Self::Ply | Self::CompressedPly | Self::Sog | Self::SogFolder, _) => None,
             (Self::Spz, SplatRenderMode::Mip) => None,
-            (_, SplatRenderMode::Mip) => Some("that they are drawn with the filter of Mip-Splatting"),
-            (_, SplatRenderMode::Surfels) => Some("that they are drawn as surfels"),
+            (_, SplatRenderMode::Mip) => Some("anti-aliasing flag (Mip-Splatting)"),
+            (_, SplatRenderMode::Surfels) => Some("surfel flag"),
         };
         all.extend(mode.map(str::to_owned));
         if self == Self::Splat && self.shift(cloud).is_some() {

@@ -40,7 +40,7 @@ pub(crate) fn write(
         export_splat::run(cloud, out, None, observer)?.tell_loss(observer);
         return Ok(());
     }
-    store(from, (format!("{} {how}", from.name), how == EDITED), cloud, map, out)?;
+    store(from, (name(&from.name, how, out), how == EDITED), cloud, map, out)?;
     Ok(())
 }
 
@@ -58,10 +58,33 @@ pub(crate) fn free_folder(scene: &Path, how: &str) -> PathBuf {
     folder_beside(scene, how, |_| false)
 }
 
+/// Returns the name of a scene that is derived into `folder`: "Desk edited", or "Desk edited 2" if that is the number
+/// of its folder. What was derived in the same way before keeps its name but for the number.
+pub(crate) fn name(from: &str, how: &str, folder: &Path) -> String {
+    let base = without(from, &format!(" {how}"), " ");
+    let number = folder.file_name().and_then(|n| n.to_str()).and_then(|n| n.rsplit_once(&format!("-{how}-")));
+    match number.filter(|(_, n)| is_number(n)) {
+        Some((_, n)) => format!("{base} {how} {n}"),
+        None => format!("{base} {how}"),
+    }
+}
+
+/// Text without an ending, which may have a number behind `gap`.
+fn without<'t>(text: &'t str, ending: &str, gap: &str) -> &'t str {
+    let numbered = text.rsplit_once(gap).filter(|(_, n)| is_number(n)).map(|(rest, _)| rest);
+    [Some(text), numbered].into_iter().flatten().find_map(|t| t.strip_suffix(ending)).unwrap_or(text)
+}
+
+fn is_number(text: &str) -> bool {
+    !text.is_empty() && text.bytes().all(|b| b.is_ascii_digit())
+}
+
 /// Returns the same, or the first folder that may be resumed.
 pub(crate) fn folder_beside(scene: &Path, how: &str, goes_on: impl Fn(&Path) -> bool) -> PathBuf {
     let name = if scene.is_dir() { scene.file_name() } else { scene.file_stem() };
     let stem = name.map_or_else(|| "scene".into(), |n| n.to_string_lossy());
+    // What is derived once more in the same way has another number, not the word twice.
+    let stem = without(&stem, &format!("-{how}"), "-");
     let place = |number: usize| match number {
         1 => scene.with_file_name(format!("{stem}-{how}")),
         n => scene.with_file_name(format!("{stem}-{how}-{n}")),
@@ -109,6 +132,26 @@ mod tests {
     use crate::io::splat_ply;
     use crate::jobs::open;
     use crate::scene::SplatRenderMode;
+
+    #[test]
+    fn what_is_derived_in_the_same_way_again_has_a_number() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let mut scene = folder.path().join("scene");
+        let mut name = "Demo".to_owned();
+        for (file, called) in
+            [("scene-edited", "Demo edited"), ("scene-edited-2", "Demo edited 2"), ("scene-edited-3", "Demo edited 3")]
+        {
+            std::fs::create_dir(&scene).expect("made");
+            let next = free_folder(&scene, EDITED);
+            name = super::name(&name, EDITED, &next);
+            assert_eq!((next.file_name().and_then(|n| n.to_str()), name.as_str()), (Some(file), called));
+            scene = next;
+        }
+        let cleaned = free_folder(&scene, "cleaned");
+        assert!(cleaned.ends_with("scene-edited-3-cleaned"));
+        assert_eq!(super::name(&name, "cleaned", &cleaned), "Demo edited 3 cleaned");
+        assert_eq!(super::name("Room 12", EDITED, Path::new("room-12-edited")), "Room 12 edited");
+    }
 
     #[test]
     fn a_scene_made_of_a_file_is_drawn_as_the_file_is() {

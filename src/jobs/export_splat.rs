@@ -81,7 +81,7 @@ impl ExportedSplat {
         let mut lines = vec![format!("{}: {gaussians} Gaussians, SH degree {sh_degree}, {size}", path.display())];
         lines.extend(rounded.map(|what| format!("rounded: {what}")));
         if !left_out.is_empty() {
-            lines.push(format!("left out: {}", left_out.join("; ")));
+            lines.push(format!("not stored: {}", left_out.join("; ")));
         }
         lines.extend(shift.map(shift_line));
         if *turned_upright {
@@ -268,7 +268,7 @@ mod tests {
         }
         assert!(sizes.iter().all(|(bytes, _)| *bytes > 4_000), "{sizes:?}");
         let splat = run(&cloud, &folder.path().join("b.splat"), None, &mut Silent).expect("written");
-        assert!(splat.drawn.is_none() && splat.lines().concat().contains("with the direction"));
+        assert!(splat.drawn.is_none() && splat.lines().concat().contains("view-dependent color"));
         let surfels = GaussianCloud { render_mode: SplatRenderMode::Surfels, ..(*cloud).clone() };
         assert!(SplatFormat::Spz.left_out(&surfels).concat().contains("surfels"));
         let far = GaussianCloud { origin: glam::DVec3::new(1e6, 0.0, 0.0), ..(*cloud).clone() };

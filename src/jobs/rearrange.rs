@@ -71,7 +71,7 @@ pub(crate) fn run(request: &RearrangeRequest, known: Option<&str>) -> Result<Rea
         }
         false => {
             let (scene, folder) = (open::scene(path)?, derived::free_folder(path, derived::EDITED));
-            let name = format!("{} edited", request.name);
+            let name = derived::name(&request.name, derived::EDITED, &folder);
             let state = derived::store(&scene, (name.clone(), true), &cloud, map.as_deref(), &folder)?;
             (folder, name, state)
         }

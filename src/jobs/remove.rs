@@ -141,17 +141,15 @@ fn new_folder(scene: &Scene, map: &SemanticMap, without: (&RemovalOptions, &str)
 /// Returns a report in words.
 pub(crate) fn summary(name: &str, report: &RemovalReport) -> String {
     let count = |n: usize| format::things(n, "Gaussian");
-    let mut text = format!("{name}: {} removed", count(report.taken()));
+    let mut text = format!("Removed {name} ({}).", count(report.taken()));
     match report.surfaces.iter().map(|s| s.roughness).reduce(f64::max) {
-        None => text += ", nothing had to be invented",
+        None => text += " Nothing had to be filled.",
         Some(rough) => {
-            text +=
-                &format!(", {} invented on {}", report.invented(), format::things(report.surfaces.len(), "surface"));
-            if report.brightened > 0 {
-                text += ", its shadow lifted";
-            }
+            let surfaces = format::things(report.surfaces.len(), "surface");
+            text += &format!(" Filled {surfaces} ({} new)", format::things(report.invented(), "Gaussian"));
+            text += if report.brightened > 0 { " and its shadow." } else { "." };
             if rough > ROUGH {
-                text += " (a guess: what is seen around is not flat)";
+                text += " A guess: the surroundings are not flat.";
             }
         }
     }

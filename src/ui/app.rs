@@ -60,6 +60,8 @@ pub struct App {
     pub(super) asks_in_vain: bool,
     pub(super) palette: Palette,
     pub(super) sheet: bool,
+    /// True once the user wants to quit while a job runs.
+    pub(super) quits: bool,
     pub(super) first_page: FirstPage,
     pub(super) photos: PhotosPane,
     pub(super) thumbnails: ObjectThumbnails,
@@ -126,6 +128,7 @@ impl App {
             asks_in_vain: false,
             palette: Palette::default(),
             sheet: false,
+            quits: false,
             first_page: FirstPage::default(),
             photos: PhotosPane::default(),
             thumbnails: ObjectThumbnails::default(),

@@ -8,21 +8,22 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use crossbeam_channel::{Receiver, Sender, bounded};
 use egui::{Button, Id, Key, Modifiers, Response, RichText, ScrollArea, TextEdit, Ui};
 
-use super::chat_lines::{self, Line};
+use super::chat_lines::{self, Answer, Line};
 pub(crate) use super::chat_model::ChatSettings;
 use super::chat_model::ModelChooser;
 use super::ctx::Ctx;
 use super::panes::PaneContents;
+use super::state::AppState;
 use super::text_field::cursor_to_end;
 use super::theme;
 use super::viewport::Viewport;
 use crate::agent::commands::{Commands, complete};
 use crate::agent::llm::Llm;
 use crate::agent::scene::{AgentScene, Effect, SceneWorld};
-use crate::agent::{AgentEvent, Planner, Policy, Refusal, Session};
+use crate::agent::{AgentEvent, Awaited, Planner, Policy, Session};
 use crate::navigate::Pose;
 use crate::scene::resource_log::{self, ResourceKind};
-use crate::scene::{Identities, IdentityId, text};
+use crate::scene::{Identities, IdentityId};
 use crate::ui::actions::Action;
 use crate::worker::Repaint;
 
@@ -63,7 +64,7 @@ struct Request {
 enum News {
     Event(AgentEvent),
     Effect(Effect),
-    Reply { text: String, candidates: Vec<(IdentityId, String)>, refused: Option<Refusal>, transcript: [String; 2] },
+    Reply { answer: Answer, transcript: [String; 2] },
 }
 
 /// The conversation with the agent.
@@ -83,9 +84,22 @@ pub(crate) struct Chat {
     /// Typed text and its completions.
     continuations: (String, Vec<String>),
     chooser: ModelChooser,
+    /// Number of the scene that the last lines are about.
+    scene: u64,
 }
 
 impl Chat {
+    /// Draws a line where another scene was opened; things before it are no longer there.
+    fn follow_scene(&mut self, state: &AppState) {
+        if self.scene != state.scene_number {
+            self.scene = state.scene_number;
+            // Scenes that nothing was said of need no line.
+            self.lines.pop_if(|line| matches!(line, Line::Opened(_)));
+            let name = state.scene.as_ref().map(|s| s.name.clone());
+            self.lines.extend(name.filter(|_| !self.lines.is_empty()).map(Line::Opened));
+        }
+    }
+
     /// Effects since the last call.
     pub(crate) fn news(&mut self) -> Vec<Effect> {
         let mut effects = Vec::new();
@@ -97,9 +111,8 @@ impl Chat {
                 News::Event(AgentEvent::Result { text, done }) => self.lines.push(chat_lines::did(&text, Some(done))),
                 News::Event(AgentEvent::Note(text)) => self.lines.push(chat_lines::did(&text, None)),
                 News::Event(AgentEvent::Thinking | AgentEvent::Piece(_)) => {}
-                News::Reply { text, candidates, refused, transcript } => {
-                    let text = text::lines(&text).into_owned();
-                    self.lines.push(Line::Answer { text, candidates, refused });
+                News::Reply { answer, transcript } => {
+                    self.lines.push(Line::Answer(answer));
                     self.transcript = Some(transcript);
                     self.cancel = None;
                 }
@@ -143,8 +156,7 @@ impl Chat {
 
     /// Adds an answer of the window itself.
     pub(crate) fn answer(&mut self, text: &str) {
-        let text = text::lines(text).into_owned();
-        self.lines.push(Line::Answer { text, candidates: Vec::new(), refused: None });
+        self.lines.push(Line::Answer(Answer::new(text)));
     }
 
     /// Moves the keyboard focus to the box.
@@ -177,6 +189,7 @@ impl Chat {
 impl PaneContents for Chat {
     fn ui(&mut self, ui: &mut Ui, cx: &mut Ctx<'_>, _: &mut Viewport) {
         let object_thumbnails = cx.thumbnails;
+        self.follow_scene(cx.state);
         let identities = cx.state.semantics.as_ref().map(|map| &map.identities);
         let (ready, mut say) = (identities.is_some(), None);
         if self.lines.is_empty() {
@@ -283,7 +296,7 @@ impl Agent {
     fn carry_out(&mut self, request: Request) {
         let Request { text, snapshot, settings, cancel } = request;
         if let Err(problem) = self.get_ready(snapshot, settings) {
-            self.reply(problem, Vec::new(), None, [String::new(), String::new()]);
+            self.reply(Answer::new(&problem), [String::new(), String::new()]);
             return;
         }
         let (Some((_, session)), Some((_, world))) = (&mut self.session, &mut self.world) else { return };
@@ -296,18 +309,16 @@ impl Agent {
         let reply = session.say(world, &text, &mut on, &cancel);
         let transcript = [session.transcript().to_json(), session.transcript().to_markdown()];
         let names = reply.candidates.iter().map(|id| (*id, crate::agent::World::identities(world).full_name(*id)));
-        let names = names.collect();
-        self.reply(reply.text, names, reply.refused, transcript);
+        let (text, asks) = match reply.pending {
+            Some(Awaited::Confirmation) => (reply.text.replace(" (yes or no)", ""), true),
+            _ => (reply.text, false),
+        };
+        let (candidates, refused) = (names.collect(), reply.refused);
+        self.reply(Answer { candidates, refused, asks, ..Answer::new(&text) }, transcript);
     }
 
-    fn reply(
-        &self,
-        text: String,
-        candidates: Vec<(IdentityId, String)>,
-        refused: Option<Refusal>,
-        transcript: [String; 2],
-    ) {
-        let _ = self.news.send(News::Reply { text, candidates, refused, transcript });
+    fn reply(&self, answer: Answer, transcript: [String; 2]) {
+        let _ = self.news.send(News::Reply { answer, transcript });
         (self.repaint)();
     }
 

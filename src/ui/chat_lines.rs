@@ -6,7 +6,7 @@ use egui::{Button, CollapsingHeader, RichText, Ui};
 use super::panes::object_thumbnails::ObjectThumbnails;
 use super::state::Tone;
 use super::theme;
-use crate::agent::Refusal;
+use crate::agent::{Refusal, RefusalKind};
 use crate::math::format::things;
 use crate::scene::{IdentityId, text};
 
@@ -19,7 +19,26 @@ const CANDIDATES: usize = 8;
 pub(super) enum Line {
     Said(String),
     Did(String, Option<bool>),
-    Answer { text: String, candidates: Vec<(IdentityId, String)>, refused: Option<Refusal> },
+    Answer(Answer),
+    /// Another scene was opened.
+    Opened(String),
+}
+
+/// Answer of the agent.
+#[derive(Default)]
+pub(super) struct Answer {
+    pub(super) text: String,
+    pub(super) candidates: Vec<(IdentityId, String)>,
+    pub(super) refused: Option<Refusal>,
+    /// True if it is a question to be answered by yes or no.
+    pub(super) asks: bool,
+}
+
+impl Answer {
+    /// An answer in words; they may come from a model.
+    pub(super) fn new(said: &str) -> Self {
+        Self { text: text::lines(said).into_owned(), ..Self::default() }
+    }
 }
 
 /// A step of the agent; its words may come from a model.
@@ -31,26 +50,35 @@ pub(super) fn did(line: &str, done: Option<bool>) -> Line {
 pub(super) fn show(ui: &mut Ui, lines: &[Line], object_thumbnails: &ObjectThumbnails) -> Option<String> {
     let mut clicked = None;
     let mut rest = lines;
+    let opened = lines.iter().rposition(|line| matches!(line, Line::Opened(_))).unwrap_or(0);
     while let Some(first) = rest.first() {
+        let at = lines.len() - rest.len();
+        // Things of an earlier scene cannot be chosen, and only the last question can be answered.
+        let can =
+            CanAnswer { choose: at >= opened, confirm: !lines[at + 1..].iter().any(|l| matches!(l, Line::Said(_))) };
+
         let steps = rest.iter().take_while(|line| matches!(line, Line::Did(..))).count();
         match (steps, rest.get(steps)) {
             (0, _) => {
-                clicked = show_line(ui, first, object_thumbnails).or(clicked);
+                clicked = show_line(ui, first, object_thumbnails, can).or(clicked);
                 rest = &rest[1..];
             }
-            // The answer repeats the steps, so they are folded.
-            (_, Some(Line::Answer { refused, .. })) => {
-                clicked = rest.get(steps).and_then(|line| show_line(ui, line, object_thumbnails)).or(clicked);
-                let calls = rest[..steps].iter().filter(|line| matches!(line, Line::Did(_, None))).count();
-                let header = RichText::new(things(calls.max(1), "step")).small().color(theme::weak());
-                CollapsingHeader::new(header)
-                    .id_salt((lines.len() - rest.len(), "steps"))
-                    .default_open(refused.is_some())
-                    .show(ui, |ui| rest[..steps].iter().for_each(|line| _ = show_line(ui, line, object_thumbnails)));
+            (_, Some(Line::Answer(answer))) => {
+                clicked = rest.get(steps).and_then(|line| show_line(ui, line, object_thumbnails, can)).or(clicked);
+                // What the answer says already is no step.
+                let is_new = |line: &&Line| !matches!(line, Line::Did(text, _) if answer.text.contains(text.trim()));
+                let told: Vec<&Line> = rest[..steps].iter().filter(is_new).collect();
+                let calls = told.iter().filter(|line| matches!(line, Line::Did(_, None))).count();
+                if calls > 0 {
+                    let header = RichText::new(things(calls, "step")).small().color(theme::weak());
+                    CollapsingHeader::new(header)
+                        .id_salt((at, "steps"))
+                        .show(ui, |ui| told.iter().for_each(|line| _ = show_line(ui, line, object_thumbnails, can)));
+                }
                 rest = &rest[steps + 1..];
             }
             _ => {
-                rest[..steps].iter().for_each(|line| _ = show_line(ui, line, object_thumbnails));
+                rest[..steps].iter().for_each(|line| _ = show_line(ui, line, object_thumbnails, can));
                 rest = &rest[steps..];
             }
         }
@@ -58,8 +86,15 @@ pub(super) fn show(ui: &mut Ui, lines: &[Line], object_thumbnails: &ObjectThumbn
     clicked
 }
 
-/// Draws one line; returns the candidate that was clicked.
-fn show_line(ui: &mut Ui, line: &Line, object_thumbnails: &ObjectThumbnails) -> Option<String> {
+/// Ways in which a line can be answered by a click.
+#[derive(Clone, Copy)]
+struct CanAnswer {
+    choose: bool,
+    confirm: bool,
+}
+
+/// Draws one line; returns the answer that was clicked.
+fn show_line(ui: &mut Ui, line: &Line, object_thumbnails: &ObjectThumbnails, can: CanAnswer) -> Option<String> {
     let mut clicked = None;
     match line {
         Line::Said(text) => {
@@ -70,21 +105,40 @@ fn show_line(ui: &mut Ui, line: &Line, object_thumbnails: &ObjectThumbnails) -> 
             let color = if *done == Some(false) { theme::warning() } else { theme::weak() };
             ui.label(RichText::new(format!("    {text}")).small().color(color));
         }
-        Line::Answer { text, candidates, refused } => {
+        Line::Opened(name) => {
+            ui.add_space(6.0);
+            ui.separator();
+            ui.label(RichText::new(format!("{} opened", text::elided(name, 48))).small().color(theme::weak()));
+        }
+        Line::Answer(Answer { text, candidates, refused, asks }) => {
             ui.horizontal_wrapped(|ui| {
-                if refused.is_some() {
+                // What the user stopped is no failure.
+                if refused.as_ref().is_some_and(|r| r.kind != RefusalKind::Stopped) {
                     theme::mark(ui, Tone::Warning, 16.0);
                 }
                 ui.label(text);
             });
-            ui.horizontal_wrapped(|ui| {
-                for (id, name) in candidates.iter().take(CANDIDATES) {
-                    object_thumbnails.show(ui, *id, THUMBNAIL_PX);
-                    if ui.add(Button::new(name).small()).clicked() {
-                        clicked = Some(name.clone());
+            if *asks && can.confirm {
+                ui.horizontal(|ui| {
+                    for answer in ["Yes", "No"] {
+                        if ui.button(answer).clicked() {
+                            clicked = Some(answer.to_lowercase());
+                        }
                     }
-                }
-            });
+                });
+            }
+            if !candidates.is_empty() {
+                ui.horizontal_wrapped(|ui| {
+                    for (id, name) in candidates.iter().take(CANDIDATES) {
+                        if can.choose {
+                            object_thumbnails.show(ui, *id, THUMBNAIL_PX);
+                        }
+                        if ui.add_enabled(can.choose, Button::new(name).small()).clicked() {
+                            clicked = Some(name.clone());
+                        }
+                    }
+                });
+            }
         }
     }
     clicked

@@ -17,6 +17,8 @@ pub(crate) struct Question {
     pub(crate) other: Option<&'static str>,
     /// Button to decline.
     pub(crate) no: &'static str,
+    /// True if `yes` deletes something for good: its button is red.
+    pub(crate) deletes: bool,
 }
 
 /// Answer to a [`Question`].
@@ -72,7 +74,11 @@ impl Question {
             ui.add_space(12.0);
             ui.horizontal(|ui| {
                 let answers = [
-                    (ui.add(theme::primary_button(self.yes)).clicked(), DialogAnswer::Yes),
+                    (
+                        ui.add(if self.deletes { theme::delete_button } else { theme::primary_button }(self.yes))
+                            .clicked(),
+                        DialogAnswer::Yes,
+                    ),
                     (self.other.is_some_and(|other| ui.button(other).clicked()), DialogAnswer::Other),
                     (ui.button(self.no).clicked(), DialogAnswer::No),
                 ];
@@ -86,7 +92,7 @@ impl Question {
 
 /// Shows a question of two answers. `Some(true)` to proceed, `Some(false)` to decline, `None` without an answer.
 pub(crate) fn show_question(ctx: &egui::Context, text: &str, yes: &'static str, no: &'static str) -> Option<bool> {
-    let question = Question { text: text.to_owned(), yes, other: None, no };
+    let question = Question { text: text.to_owned(), yes, other: None, no, deletes: false };
     question.show(ctx).map(|answer| answer == DialogAnswer::Yes)
 }
 

@@ -254,7 +254,7 @@ fn summary(ui: &mut Ui, known: &ModelList, means: &Means, most_photos: usize, is
     );
     ui.label(parts.join(" "));
     let warning = match means.encoder.as_str() {
-        NO_ENCODER => Some("Words find nothing until you name things."),
+        NO_ENCODER => Some("Objects will be unnamed: name them to query by text."),
         id if known.get(id).is_some_and(|(e, _)| e.built_in) => {
             Some("The built-in encoder was trained on synthetic scenes: on real photos, words find almost nothing.")
         }

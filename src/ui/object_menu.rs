@@ -60,9 +60,11 @@ pub(crate) fn show(ui: &mut Ui, all: &Identities, id: IdentityId, cx: &mut Ctx<'
             Row::Line => drop(ui.separator()),
             Row::MergeInto => drop(ui.menu_button("Merge into", |ui| merge_into(ui, all, id, cx))),
             Row::Do(action, name, keyed) => {
-                let key = keyed.map(|keyed| keys::label(ui.ctx(), &keyed)).unwrap_or_default();
-                let button = ui.add(Button::new(name).shortcut_text(key)).on_hover_text(action.tooltip());
-                if button.clicked() {
+                let button = match keyed {
+                    Some(keyed) => Button::new(name).shortcut_text(keys::label(ui.ctx(), &keyed)),
+                    None => Button::new(name),
+                };
+                if ui.add(button).on_hover_text(action.tooltip()).clicked() {
                     cx.ask(action);
                     ui.close();
                 }

@@ -219,6 +219,11 @@ pub(crate) fn primary_button(text: &str) -> egui::Button<'static> {
     egui::Button::new(RichText::new(text.to_owned()).color(on_accent()).strong()).fill(accent()).stroke(Stroke::NONE)
 }
 
+/// A button that deletes something for good.
+pub(crate) fn delete_button(text: &str) -> egui::Button<'static> {
+    egui::Button::new(RichText::new(text.to_owned()).color(panel()).strong()).fill(error()).stroke(Stroke::NONE)
+}
+
 /// A small title of a group.
 pub(crate) fn section(ui: &mut Ui, title: &str) {
     ui.add_space(6.0);

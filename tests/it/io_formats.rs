@@ -106,7 +106,7 @@ fn the_command_line_writes_every_format_and_tells_what_it_lost() {
     }
     assert_eq!(cloud(Path::new(&at("a.ply"))), cloud(Path::new(few)));
     let told = fmlgs(&["export", few, "--out", &at("b.splat"), "--no-measure", "-q"]).ok().stdout;
-    assert!(told.contains("left out: how colors change") && told.contains("Mip-Splatting"), "{told}");
+    assert!(told.contains("not stored: view-dependent color") && told.contains("Mip-Splatting"), "{told}");
     assert!(!told.contains("PSNR"), "{told}");
     // A SOG is not written over a SOG, nothing over what is read, and endings are known.
     fmlgs(&["export", few, "--out", &at("sog/meta.json"), "-q"]).fails_with(1);

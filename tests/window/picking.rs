@@ -15,6 +15,7 @@ use fmlgs::scene::{GaussianCloud, Identities, IdentityId, Level, NO_IDENTITY, Se
 use fmlgs::ui::actions::Action;
 use fmlgs::ui::app::App;
 use fmlgs::ui::color_by::ColorBy;
+use fmlgs::worker::ViewMode;
 
 const TABLE: IdentityId = 1;
 const LAMP: IdentityId = 2;
@@ -203,11 +204,11 @@ fn things_are_pointed_at_selected_isolated_and_hidden() {
     // The menu of a right click is about what is under the cursor.
     w.click(shade, PointerButton::Secondary, plain);
     assert_eq!(w.selected(), Some(SHADE));
-    assert!(w.shows("Query this") && w.shows("Export Gaussians"), "the menu");
-    w.harness.get_by_label("Query this").click();
+    assert!(w.shows("Ask for this") && w.shows("Export Gaussians"), "the menu");
+    w.harness.get_by_label("Ask for this").click();
     w.harness.run_steps(4);
     assert_eq!(w.app().viewport.queries.found(), [SHADE]);
-    assert!(!w.shows("Query this"), "a choice closes it");
+    assert!(!w.shows("Ask for this"), "a choice closes it");
 }
 
 #[test]
@@ -254,6 +255,20 @@ fn what_is_not_in_view_is_marked_and_masks_follow_the_eye() {
     assert!(w.shows("One color per object"), "the legend");
     w.ask(Action::Tint(ColorBy::Objects));
     assert!(!w.shows("One color per object"), "again for the RGB image");
+
+    // What is drawn and what tints it are one choice, but with Shift.
+    let shown = |w: &mut Window| {
+        w.harness.run_steps(3);
+        (w.shows("One color per object"), w.app().layout.mode)
+    };
+    w.harness.key_press(Key::Num3);
+    assert_eq!(shown(&mut w), (true, ViewMode::Rgb));
+    w.harness.key_press(Key::Num5);
+    assert_eq!(shown(&mut w), (false, ViewMode::Depth));
+    w.harness.key_press_modifiers(Modifiers::SHIFT, Key::Num3);
+    assert_eq!(shown(&mut w), (true, ViewMode::Depth));
+    w.harness.key_press(Key::Num1);
+    assert_eq!(shown(&mut w), (false, ViewMode::Rgb));
 }
 
 /// Prints how long it takes from the cursor, and from a click, to the outline.

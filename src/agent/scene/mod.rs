@@ -277,10 +277,10 @@ impl World for SceneWorld {
                 Ok(what)
             }
             Before::Named(map, id, old) => {
-                let new = self.parts.map.identities.name(id);
                 self.parts.map = map;
+                let name = self.parts.map.identities.name(id);
                 (self.emit)(Effect::RenameUndone(id, old));
-                Ok(format!("calling it {new}"))
+                Ok(format!("it is \u{201c}{name}\u{201d} again"))
             }
             Before::Eye(eye, what) => {
                 moves::straight(self, eye, String::new()).map_err(|e| WorldError(e.reason))?;

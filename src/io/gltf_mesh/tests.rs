@@ -192,7 +192,7 @@ fn wrong_content_is_named() {
     };
     type Change = Box<dyn Fn(&mut Value)>;
     let cases: Vec<(&str, Change)> = vec![
-        ("claims 9 values in accessors[0]", Box::new(claims(9))),
+        ("9 values in accessors[0] announced", Box::new(claims(9))),
         ("what its buffers can hold", Box::new(claims(1 << 60))),
         ("accessors[7], but there are 2", Box::new(|r| r["meshes"][0]["primitives"][0]["indices"] = 7.into())),
         ("meshes[1], but there are 1", Box::new(|r| r["nodes"][0]["mesh"] = 1.into())),

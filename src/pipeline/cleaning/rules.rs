@@ -4,6 +4,7 @@ use std::fmt;
 use std::str::FromStr;
 
 use super::{CloudMeasures, SplatMeasure};
+use crate::math::format::capital;
 use crate::math::srgb;
 
 /// Opacity below which a Gaussian is hardly ever rendered.
@@ -57,6 +58,15 @@ impl CleanRule {
     /// Rules without a number.
     pub(crate) const NAMED: [Self; 5] =
         [Self::Floaters, Self::Faint, Self::Needles, Self::Oversized, Self::Unsupported];
+
+    /// Returns the name on screen.
+    pub(crate) fn title(&self) -> String {
+        match self {
+            Self::Faint => "Nearly transparent".into(),
+            Self::Unsupported => "Not seen in photos".into(),
+            other => capital(&other.to_string()),
+        }
+    }
 
     /// Returns the meaning, for the user.
     pub(crate) fn meaning(&self) -> &'static str {

@@ -65,7 +65,7 @@ pub(super) fn unseen(
     let kept: Vec<usize> = (0..cloud.len()).filter(|&i| !gone[i]).collect();
     let rest = new.cloned().unwrap_or_else(|| cloud.select(&kept));
     let mut renderer = Renderer::new();
-    let mut ticker = Ticker::new("Looking for what no photo has seen", cameras.len());
+    let mut ticker = Ticker::new("Finding hidden surfaces", cameras.len());
     let (mut before, mut after) = (vec![0.0_f32; cloud.len()], vec![0.0_f32; rest.len()]);
     for (k, camera) in cameras.iter().enumerate() {
         ticker.tick(k, observer)?;

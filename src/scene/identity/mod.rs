@@ -144,10 +144,13 @@ impl Identities {
         self.list.iter().filter(|i| i.level == level).count()
     }
 
-    /// Numbers of each level in words: "3 objects and 1 part".
+    /// Numbers of each level in words: "3 objects and 1 part", "1 object".
     pub(crate) fn counted(&self) -> String {
         let [objects, parts] = [Level::Object, Level::Part].map(|level| self.count(level));
-        format!("{} and {}", things(objects, "object"), things(parts, "part"))
+        match parts {
+            0 => things(objects, "object"),
+            _ => format!("{} and {}", things(objects, "object"), things(parts, "part")),
+        }
     }
 
     /// Returns whether there are no identities.

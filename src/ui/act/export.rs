@@ -40,7 +40,7 @@ pub(super) fn is_saved(app: &mut App, path: PathBuf) {
 
 /// Asks for a file, and writes the Gaussians that `of` selects in its format.
 fn gaussians(app: &mut App, name: &str, of: impl FnOnce(&mut App) -> Option<Arc<GaussianCloud>> + 'static) {
-    let title = format!("Export Gaussians: the ending chooses among {}", SplatFormat::endings());
+    let title = "Export Gaussians";
     app.choose(FileRequest::save(title, format!("{name}.ply")), |app, path| {
         let Some(cloud) = of(app) else { return };
         let info = JobInfo::short(format!("Writing {}", file_name(&path)));

@@ -119,7 +119,7 @@ fn replace_scene(app: &mut App, open: impl FnOnce(&mut App) + 'static) {
         return open(app);
     };
     let text = format!("{title} is still running. Cancel it and continue? Saved progress is kept.");
-    let question = Question { text, yes: "Cancel and continue", other: None, no: "Keep running" };
+    let question = Question { text, yes: "Cancel and continue", other: None, no: "Keep running", deletes: false };
     app.put_question(question, |app, answer| {
         if answer == DialogAnswer::Yes {
             remote::cancel_job(app);

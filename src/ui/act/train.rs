@@ -57,7 +57,7 @@ fn ask_how_to_train(app: &mut App, changes: &str) {
          stays as it is if you train anew.",
         sentence(changes)
     );
-    let question = Question { text, yes: "Train anew", other: Some("Go on"), no: "Leave it" };
+    let question = Question { text, yes: "Train anew", other: Some("Go on"), no: "Leave it", deletes: false };
     app.put_question(question, |app, answer| match answer {
         DialogAnswer::Yes => start(app, false, IfChanged::Anew),
         DialogAnswer::Other => start(app, false, IfChanged::GoOn),

@@ -1,5 +1,6 @@
 //! The view: its camera, its colors, and the selection.
 
+use std::collections::BTreeSet;
 use std::sync::Arc;
 
 use egui::Context;
@@ -53,20 +54,45 @@ pub(in crate::ui) fn go_to_photo(app: &mut App, ctx: &Context, index: usize) {
     app.viewport.look_through(index, &app.state, &app.tasks, now(ctx));
 }
 
-/// Chooses what the active view shows.
-pub(in crate::ui) fn show(app: &mut App, mode: ViewMode) {
+/// Chooses what the active view shows, without a tint; with Shift, a tint stays over it. A difference from a photo needs
+/// the nearest one.
+pub(in crate::ui) fn show(app: &mut App, ctx: &Context, mode: ViewMode) {
     *app.layout.mode_of(app.viewport.queries.is_second()) = mode;
-    // The rendered image is shown without a tint.
-    if mode == ViewMode::Rgb {
+    if mode == ViewMode::Rgb || !ctx.input(|i| i.modifiers.shift) {
         app.viewport.queries.tint(ColorBy::Masks);
     }
+    if mode.needs_photo() && app.viewport.photo_index().is_none() {
+        nearest_photo(app, &BTreeSet::new()).into_iter().for_each(|photo| go_to_photo(app, ctx, photo));
+    }
+}
+
+/// Tints the rendered image of the active view, or ends that; with Shift, whatever the view shows.
+pub(in crate::ui) fn tint(app: &mut App, ctx: &Context, by: ColorBy) {
+    if !ctx.input(|i| i.modifiers.shift) {
+        *app.layout.mode_of(app.viewport.queries.is_second()) = ViewMode::Rgb;
+    }
+    app.viewport.queries.tint(by);
+}
+
+/// Photo that looks most like the view, by place and direction, without those to be `left_out`.
+pub(in crate::ui) fn nearest_photo(app: &App, left_out: &BTreeSet<usize>) -> Option<usize> {
+    let (scene, eye) = (app.state.scene.as_ref()?, app.viewport.pose());
+    let photos = &scene.dataset.as_ref()?.photos;
+    let size = scene.home.bounds.radius();
+    let away = |i: &usize| {
+        let camera = &photos[*i].camera;
+        let turn = 1.0 - (camera.world_from_camera * DVec3::Z).dot(eye.world_from_camera * DVec3::Z);
+        camera.center.distance(eye.center) / size + turn
+    };
+    let all = (0..photos.len()).filter(|i| !left_out.contains(i));
+    all.min_by(|a, b| away(a).total_cmp(&away(b)))
 }
 
 /// Shows the photo beside the rendering, or not.
 pub(in crate::ui) fn toggle_compare(app: &mut App, ctx: &Context) {
     app.layout.compare = !app.layout.compare;
     if app.layout.compare && app.viewport.photo_index().is_none() {
-        step_photo(app, ctx, 1);
+        nearest_photo(app, &BTreeSet::new()).into_iter().for_each(|photo| go_to_photo(app, ctx, photo));
     }
 }
 

@@ -2,10 +2,33 @@
 
 use egui::{Context, ThemePreference, ViewportCommand};
 
+use super::remote;
 use crate::ui::app::App;
+use crate::ui::dialogs::{DialogAnswer, Question};
 use crate::ui::dock::Dock;
 use crate::ui::layout::Layout;
-use crate::ui::state::Tone;
+use crate::ui::state::{RunningJob, Tone};
+use crate::worker::Makes;
+
+/// Asks once before the window closes while a job runs. A job on another computer goes on there.
+pub(in crate::ui) fn watch_close(app: &mut App, ctx: &Context) {
+    if app.quits {
+        return ctx.send_viewport_cmd(ViewportCommand::Close);
+    }
+    let is_here = |job: &&RunningJob| !remote::is_remote(job.id) && !job.canceling && job.info.makes != Makes::Scene;
+    let Some(job) = app.state.job.as_ref().filter(is_here).filter(|_| ctx.input(|i| i.viewport().close_requested()))
+    else {
+        return;
+    };
+    ctx.send_viewport_cmd(ViewportCommand::CancelClose);
+    let kept = match job.info.makes {
+        Makes::Gaussians => "It goes on from its last checkpoint next time.",
+        _ => "It begins again next time.",
+    };
+    let text = format!("{} is still running. {kept}", job.info.title);
+    let question = Question { text, yes: "Quit", other: None, no: "Keep running", deletes: false };
+    app.put_question(question, |app, answer| app.quits = answer == DialogAnswer::Yes);
+}
 
 /// Shows only the view, or everything again.
 pub(in crate::ui) fn fill(app: &mut App, ctx: &Context) {

@@ -48,8 +48,8 @@ macro_rules! action_table {
             FindObjects: "Find objects and parts",
                 "From the labels that came with the photos, or else from what networks or colors tell."
                 => objects::find(app);
-            SegmentPhoto: "Segment this photo",
-                "Find what this photo, or else the nearest one, shows that is nobody's yet. Objects and parts stay; can be undone."
+            SegmentPhoto: "Add from this photo",
+                "Find objects that this photo, or else the nearest one, shows and that are not known yet. Objects and parts stay; can be undone."
                 => objects::segment_photo(app);
             ChooseMasks: "Find objects with other masks\u{2026}",
                 "Labels of ISAT, LabelMe, COCO, YOLO, fmlgs synth, SPIn-NeRF, 3D-OVS, LERF-Mask or Ref-LERF; one labeled photo is enough."
@@ -117,7 +117,7 @@ macro_rules! action_table {
             ExportTarget(id: IdentityId): format!("Export #{id}\u{2026}"),
                 "Write its Gaussians in the format that 3DGS viewers read." => export::identity(app, id);
             Remove(id: IdentityId): format!("Remove #{id} and fill"),
-                "Take it out, into a scene of its own that is shown beside this one: what it hid is closed from what is around."
+                "Make a copy of the scene without it, shown beside this one. What it hid is filled from what is around."
                 => objects::remove(app, &[id]);
             AnotherFill(request: Box<RemoveRequest>): "Another fill",
                 "Remove it again, with another choice of what hides below it; the scene made before stays."
@@ -129,7 +129,7 @@ macro_rules! action_table {
                 "Drag it along the axes, turn, scale, duplicate or recolor it; can be undone." => edit::transform(app, id);
             ApplyTransform: "Apply the transform", "Carry out what the view shows of a moved, duplicated or recolored thing."
                 => edit::apply_transform(app);
-            MeasureSplats: "Clean: measure Gaussians",
+            MeasureSplats: "Clean up\u{2026}",
                 "Size, shape, opacity and neighbors of each, and what the photos show of it: finds floaters and the like."
                 => edit::measure_splats(app);
             BrushSplats: "Choose Gaussians by brush", "Brush over what is chosen in the Clean pane, once it is measured."
@@ -151,9 +151,9 @@ macro_rules! action_table {
                     Edit::Reshape { id, .. } => format!("Correct the extent of #{id}"),
                 }, "Correct the segmentation; can be undone." => edit::apply(app, edit);
             SegmentNew(of: Option<IdentityId>): match *of {
-                    None => "Stop selecting".into(),
-                    Some(NO_IDENTITY) => "Select a new object".to_owned(),
-                    Some(id) => format!("Select a new part of #{id}"),
+                    None => "Stop selecting by clicks".into(),
+                    Some(NO_IDENTITY) => "New object".to_owned(),
+                    Some(id) => format!("New part of #{id}"),
                 }, "Click on it or draw a line through it, in any view; name it, and it can be asked for everywhere."
                 => edit::segment(app, of);
             Correct(id: IdentityId): format!("Correct #{id} by clicks"),
@@ -194,14 +194,15 @@ macro_rules! action_table {
             Show(mode: ViewMode): match mode {
                     ViewMode::Rgb => "Show RGB".to_owned(),
                     other => format!("Show {}", other.text().to_lowercase()),
-                }, "Choose what the viewport shows." => view::show(app, mode);
+                }, "Choose what the viewport shows. With Shift, over the colors that are shown." => view::show(app, ctx, mode);
             Tint(by: ColorBy): format!("Color by {}", by.text().to_lowercase()),
-                "Color the view this way; again for the RGB image." => app.viewport.queries.tint(by);
+                "Color the view this way; again for the RGB image. With Shift, whatever is shown."
+                => view::tint(app, ctx, by);
             ToggleCompare: "Compare with the photo", "Show the photo beside the rendering with a slider between them.", "C"
                 => view::toggle_compare(app, ctx);
             ToggleSplit: "Split view", "Two views of the scene by one camera, each with its own query and colors.", "8"
                 => view::toggle_split(app);
-            OtherView: "Work in the other view", "Keys, queries and colors act on it from now on.", "0"
+            OtherView: "Switch view", "Keys, queries and colors act on it from now on.", "0"
                 => view::other_view(app);
             ChooseComparison: "Compare with another scene\u{2026}",
                 "Show its Gaussians in the second view by the same camera: two trainings of the same photos."
@@ -209,7 +210,7 @@ macro_rules! action_table {
             OpenComparison(path: Option<PathBuf>): path.as_ref().map_or_else(|| "End the comparison with another scene".into(),
                     |p| format!("Compare with the scene {}", p.display())), "Show its Gaussians in the second view."
                 => open::compare_scene(app, path);
-            ToggleDim: "Dim the rest", "Darken everything except answers and the selection.", "9"
+            ToggleDim: "Dim everything else", "Darken everything except answers and the selection.", "9"
                 => app.layout.dim = !app.layout.dim;
             ToggleCameras: "Show or hide cameras", "Show the camera of every photo in the view.", "V"
                 => app.layout.cameras = !app.layout.cameras;

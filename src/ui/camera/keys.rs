@@ -21,7 +21,7 @@ enum KeyChange {
 pub(crate) fn show(ui: &mut Ui, pane: &mut CameraPane, eye: &Pose) -> Option<Pose> {
     let mut wanted_change: Option<(usize, KeyChange)> = None;
     ScrollArea::vertical().auto_shrink([false, false]).show(ui, |ui| {
-        Grid::new("keys").num_columns(12).striped(true).spacing([10.0, 4.0]).show(ui, |ui| {
+        Grid::new("keys").num_columns(8).striped(true).spacing([10.0, 4.0]).show(ui, |ui| {
             for text in ["Keyframe", "Name", "Time", "Field of view", "Roll", "Wait"] {
                 ui.label(caption(text));
             }
@@ -103,18 +103,23 @@ fn row(ui: &mut Ui, i: usize, key: &mut PathKey, chosen: bool) -> Option<KeyChan
     }
     let wait = DragValue::new(&mut key.dwell_secs).range(0.0..=600.0).speed(0.02).suffix(" s");
     ui.add(wait).accessible_name(named("Wait"));
-    let buttons = [
-        ("Go", "Move the view to this keyframe.", KeyChange::Go),
-        ("Update", "Replace this keyframe with the current view.", KeyChange::Update),
-        ("Copy", "Insert a copy after it.", KeyChange::Copy),
-        ("Earlier", "Swap it with the previous keyframe.", KeyChange::Up),
-        ("Later", "Swap it with the next keyframe.", KeyChange::Down),
-        ("Delete", "Remove it from the path.", KeyChange::Delete),
-    ];
-    for (text, tip, wanted) in buttons {
-        if ui.add(Button::new(text).small()).on_hover_text(tip).clicked() {
-            wanted_change = Some(wanted);
-        }
+    if ui.add(Button::new("Go").small()).on_hover_text("Move the view to this keyframe.").clicked() {
+        wanted_change = Some(KeyChange::Go);
     }
+    let more = ui.menu_button("\u{2026}", |ui| {
+        for (text, tip, wanted) in [
+            ("Update", "Replace this keyframe with the current view.", KeyChange::Update),
+            ("Copy", "Insert a copy after it.", KeyChange::Copy),
+            ("Earlier", "Swap it with the previous keyframe.", KeyChange::Up),
+            ("Later", "Swap it with the next keyframe.", KeyChange::Down),
+            ("Delete", "Remove it from the path.", KeyChange::Delete),
+        ] {
+            if ui.button(text).on_hover_text(tip).clicked() {
+                wanted_change = Some(wanted);
+                ui.close();
+            }
+        }
+    });
+    more.response.accessible_name(format!("More on keyframe {}", i + 1));
     wanted_change
 }

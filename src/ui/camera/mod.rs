@@ -196,7 +196,7 @@ impl CameraPane {
         let at = |clip: &Clip, i: i32| clip.at(clip.seconds() * f64::from(i) / f64::from(last)).map(|p| p.center);
         let way = self.player.clip().map(|clip| (0..=last).filter_map(|i| at(clip, i)).collect()).unwrap_or_default();
         let keys = self.path.keys.iter().enumerate().map(|(i, k)| (k.center, self.selected == Some(i))).collect();
-        CameraRoute { way, keys, show_reach: self.show_reach }
+        CameraRoute { way, keys, show_reach: self.show_reach, plays: self.player.playing }
     }
 
     fn controls(&mut self, ui: &mut Ui, cx: &mut Ctx<'_>) {

@@ -5,7 +5,7 @@ mod input;
 
 use egui::Ui;
 
-use super::act::{act, edits, query, remote, view};
+use super::act::{act, edits, query, remote, view, window};
 use super::actions::Pane;
 use super::app::App;
 use super::state::Tone;
@@ -22,6 +22,7 @@ impl eframe::App for App {
         theme::begin_frame(&ctx);
         self.layout.zoom = ctx.zoom_factor();
         input::take(self, &ctx);
+        window::watch_close(self, &ctx);
         draw::panes(self, ui);
         draw::over_everything(self, &ctx);
         for action in std::mem::take(&mut self.actions) {

@@ -225,7 +225,7 @@ impl SplatChoice {
     fn show_rule(&mut self, ui: &mut Ui, rule: CleanRule, count: usize) {
         ui.horizontal(|ui| {
             let mut on = self.rules.contains(&rule);
-            let row = ui.add_enabled(count > 0, Checkbox::new(&mut on, sentence(&rule.to_string())));
+            let row = ui.add_enabled(count > 0, Checkbox::new(&mut on, rule.title()));
             if row.on_hover_text(sentence(rule.meaning()) + ".").changed() {
                 self.rules.retain(|other| *other != rule);
                 self.rules.extend(on.then_some(rule));

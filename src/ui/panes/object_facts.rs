@@ -19,7 +19,7 @@ use crate::ui::actions::Action;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, VariantArray, IntoStaticStr)]
 pub(super) enum SortKey {
     #[default]
-    #[strum(serialize = "as found")]
+    #[strum(serialize = "original order")]
     Found,
     #[strum(serialize = "by name")]
     Name,

@@ -61,7 +61,11 @@ impl PaneContents for ObjectsPane {
         };
         let identities = &map.identities;
         let conflicts = map.findings.as_ref().map_or(0, |f| f.conflicts().len());
-        ui.weak(format!("{}, from the masks of {}", identities.counted(), things(map.seeds.len(), "photo")));
+        let from = match map.seeds.len() {
+            0 => "selected by hand".to_owned(),
+            n => format!("from the masks of {}", things(n, "photo")),
+        };
+        ui.weak(format!("{}, {from}", identities.counted()));
         if conflicts > 0 {
             let link = ui.link(RichText::new(format!("{} where photos disagreed", things(conflicts, "doubt"))));
             if link.on_hover_text("List the affected objects and parts first").clicked() {
@@ -295,7 +299,7 @@ fn show_how_to_begin(ui: &mut Ui, cx: &mut Ctx<'_>) {
         cx.ask(Action::ChooseMasks);
     }
     let by_clicks = Action::SegmentNew(Some(NO_IDENTITY));
-    let selects = ui.add_enabled(idle, button("Select by clicks\u{2026}")).on_disabled_hover_text(why);
+    let selects = ui.add_enabled(idle, button("New object\u{2026}")).on_disabled_hover_text(why);
     if selects.on_hover_text(by_clicks.tooltip()).clicked() {
         cx.ask(by_clicks);
     }

@@ -10,8 +10,10 @@ use crate::ui::theme;
 
 /// Largest distance of the cursor from a camera that it picks, points.
 const REACH: f32 = 12.0;
+/// Number of cameras that are drawn, the nearest ones. All of them would hide the scene.
+const MOST: usize = 10;
 
-/// Draws every camera into the view in `rect`, which `eye` sees; a click on one looks through it. Returns true if the
+/// Draws the nearest cameras into the view in `rect`, which `eye` sees; a click on one looks through it. Returns true if the
 /// cursor is on one.
 pub(super) fn show(ui: &Ui, rect: Rect, eye: &Camera, response: &Response, cx: &mut Ctx<'_>) -> bool {
     let state = cx.state;
@@ -23,19 +25,21 @@ pub(super) fn show(ui: &Ui, rect: Rect, eye: &Camera, response: &Response, cx: &
         scene.held_out(cx.layout.config.holdout_every).into_iter().collect();
     let cursor = response.hover_pos().filter(|pos| rect.contains(*pos));
     let place = |p: DVec2| rect.min + egui::vec2(p.x as f32, p.y as f32);
+    // From inside, a camera is only lines along the border of the view.
+    let distance = |i: usize| dataset.photos[i].camera.center.distance(eye.center);
+    let mut drawn: Vec<usize> = (0..dataset.photos.len()).filter(|i| distance(*i) >= size).collect();
+    drawn.sort_by(|a, b| distance(*a).total_cmp(&distance(*b)));
+    drawn.retain(|i| eye.project(dataset.photos[*i].camera.center).is_some());
+    drawn.truncate(MOST);
     let nearest = cursor.and_then(|cursor| {
-        let apexes = dataset.photos.iter().enumerate();
+        let apexes = drawn.iter().map(|i| (*i, &dataset.photos[*i]));
         let seen = apexes.filter_map(|(i, p)| Some((i, place(eye.project(p.camera.center)?))));
         let (i, at) = seen.min_by(|a, b| a.1.distance(cursor).total_cmp(&b.1.distance(cursor)))?;
         (at.distance(cursor) < REACH).then_some((i, at))
     });
-    for (i, photo) in dataset.photos.iter().enumerate() {
-        // From inside, a camera is only lines along the border of the view.
-        let distance = photo.camera.center.distance(eye.center);
-        if distance < size {
-            continue;
-        }
-        let near = (1.5 * scene.home.bounds.radius() / distance).clamp(0.25, 1.0) as f32;
+    for &i in &drawn {
+        let photo = &dataset.photos[i];
+        let near = (1.5 * scene.home.bounds.radius() / distance(i)).clamp(0.25, 1.0) as f32;
         let pointed = nearest.is_some_and(|n| n.0 == i);
         let color = match (pointed, held_out.contains(&i)) {
             (true, _) => theme::accent(),

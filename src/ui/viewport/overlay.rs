@@ -69,7 +69,7 @@ impl ViewCards<'_> {
         if legend::is_needed(self.queries.settings(), depth) && rect.height() > LOW && !is_other {
             let shares = self.queries.maps().map(|m| [m.unknown_share(), m.invented_share()]);
             let can_segment = dataset.is_some() && state.is_trained();
-            let segment = if self.photo.is_some() { "Segment this photo" } else { "Segment the nearest photo" };
+            let segment = if self.photo.is_some() { "Add from this photo" } else { "Add from the nearest photo" };
             // Above the facts if there is no room beside them.
             let up = if rect.width() < NARROW_BESIDE_FACTS { -46.0 } else { 0.0 };
             card(ui, rect, legend, Align2::RIGHT_BOTTOM, up, |ui| {
@@ -137,21 +137,18 @@ impl ViewCards<'_> {
         let removed = state.removed.as_ref().filter(|r| r.folder == comparison.path);
         let name = removed.map_or_else(|| comparison.name.clone(), |r| format!("without {}", r.name));
         let place = format!("{name}\n{}", comparison.path.display());
-        ui.label(RichText::new(text::elided(&name, 40)).strong()).on_hover_text(text::lines(&place));
+        // The buttons of a removal leave less room.
+        let most = if removed.is_some() { 24 } else { 40 };
+        ui.label(RichText::new(text::elided(&name, most)).strong()).on_hover_text(text::lines(&place));
         if let Some(removed) = removed {
             let open = ui.button("Open").on_hover_text("Go on with this scene. The other one stays where it is.");
             if open.clicked() {
                 cx.ask(Action::Open(removed.folder.clone()));
             }
             other_fills(ui, &removed.request, cx);
-            // A retrained scene also holds photos, which are not deleted.
-            let delete = Action::DeleteRemoved;
-            if !removed.request.retrain && ui.button("Delete").on_hover_text(delete.tooltip()).clicked() {
-                cx.ask(delete);
-            }
         }
         if let Some(psnr) = self.display.picture().and_then(|p| p.second.as_ref()?.psnr) {
-            ui.colored_label(theme::accent(), format!("preview {}", format::decibel(psnr)));
+            ui.colored_label(theme::accent(), psnr_text(psnr));
         }
         let close = ui.button("\u{d7}").on_hover_text(Action::OpenComparison(None).text());
         if close.accessible_name(Action::OpenComparison(None).text()).clicked() {
@@ -214,10 +211,8 @@ impl ViewCards<'_> {
                 ui.label(RichText::new(text::elided(&p.name(), 28)).strong()).on_hover_text(&*p.name());
                 ui.weak(format!("{} of {total}", p.index() + 1));
                 if let Some(psnr) = self.display.picture().and_then(|p| p.psnr) {
-                    ui.label(RichText::new(format!("preview {}", format::decibel(psnr))).color(theme::accent()))
-                        .on_hover_text(
-                            "PSNR of the view at screen resolution. Evaluation uses the training resolution.",
-                        );
+                    ui.label(RichText::new(psnr_text(psnr)).color(theme::accent()))
+                        .on_hover_text("At the size of the view. Evaluation uses the size of training.");
                 }
                 if p.failed() {
                     ui.colored_label(theme::warning(), "photo not loaded");
@@ -252,9 +247,6 @@ impl ViewCards<'_> {
                 (None, all) => format!("{} Gaussians", format::count(all)),
             },
         ];
-        if let Some((near, far)) = p.depth_range {
-            parts.push(format!("depth {near:.2} to {far:.2}, blue to red"));
-        }
         let modes = [Some(layout.mode), layout.split_view.then_some(layout.second_mode)];
         match self.photo {
             None if modes.iter().flatten().any(|mode| mode.needs_photo()) => {
@@ -305,6 +297,12 @@ fn other_fills(ui: &mut Ui, last: &RemoveRequest, cx: &mut Ctx<'_>) {
             next = RemoveRequest { retrain: true, ..last.clone() };
             changed = true;
         }
+        // A retrained scene also holds photos, which are not deleted.
+        let delete = Action::DeleteRemoved;
+        if !last.retrain && ui.button(delete.text()).on_hover_text(delete.tooltip()).clicked() {
+            cx.ask(delete);
+            ui.close();
+        }
         if changed {
             ui.close();
         }
@@ -317,4 +315,9 @@ fn other_fills(ui: &mut Ui, last: &RemoveRequest, cx: &mut Ctx<'_>) {
 
 fn rate_text(fps: f64) -> String {
     if fps < 10.0 { format!("{fps:.1} fps") } else { format!("{fps:.0} fps") }
+}
+
+/// PSNR of a picture at the size of the view.
+fn psnr_text(psnr: f64) -> String {
+    format!("PSNR {psnr:.1} dB (view size)")
 }

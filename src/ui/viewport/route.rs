@@ -15,6 +15,8 @@ pub(crate) struct CameraRoute {
     pub(crate) keys: Vec<(DVec3, bool)>,
     /// True if the places that the camera can reach are drawn, too.
     pub(crate) show_reach: bool,
+    /// True while the clip plays.
+    pub(crate) plays: bool,
 }
 
 /// Draws the loaded clip, the keyframes of the path, and the keypoints of the scene, as `eye` sees them.

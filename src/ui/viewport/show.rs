@@ -64,7 +64,8 @@ impl Viewport {
         }
         let areas: Vec<ViewArea> = views.areas(shown, has_other).collect();
         let is_second = self.queries.is_second();
-        let on_camera = self.show_frames(ui, &areas, &response, !takes_clicks, cx);
+        let with_cameras = cx.layout.cameras && self.has_nothing_to_look_at() && !route.is_some_and(|r| r.plays);
+        let on_camera = self.show_frames(ui, &areas, &response, with_cameras, cx);
         let picks = !takes_drags && !takes_clicks;
         if let Some(semantics) = state.semantics.as_ref().filter(|_| picks) {
             let under = views.area_under_pointer(ui, shown, has_other);
@@ -87,6 +88,13 @@ impl Viewport {
             return;
         };
         query::details::show(ui, &mut self.queries, semantics, cloud, cx);
+    }
+
+    /// Returns whether cameras would cover nothing: no tool is in use, and nothing is asked for, selected, isolated or
+    /// seen through a photo's camera.
+    fn has_nothing_to_look_at(&self) -> bool {
+        let is_free = self.tool.is_none() && self.photo.is_none() && !self.visibility.is_isolated();
+        is_free && self.picking.selected().is_none() && !self.queries.is_asked()
     }
 
     /// The frame in a view: all of it, or what the photo's aspect ratio leaves.
@@ -113,8 +121,6 @@ impl Viewport {
         cx: &mut Ctx<'_>,
     ) -> bool {
         let state = cx.state;
-        // Around an isolated identity, cameras would be clutter.
-        let with_cameras = with_cameras && cx.layout.cameras && self.photo.is_none() && !self.visibility.is_isolated();
         let mut on_camera = false;
         for area in areas {
             self.queries.work_in(area.second);

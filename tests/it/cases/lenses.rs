@@ -39,7 +39,7 @@ fn a_panorama_is_named_and_what_to_do_with_it() {
     let unknown = with(33, &bytes).fails_with(1).stderr;
     assert!(unknown.contains("the camera model number 33") && unknown.contains("image_undistorter"), "{unknown}");
     let cut = with(17, &bytes[..bytes.len() - 8]).fails_with(1).stderr;
-    assert!(cut.contains("claims 1 cameras"), "{cut}");
+    assert!(cut.contains("1 cameras announced"), "{cut}");
     // A fisheye in its place is read, once the photos are called as they are listed: by camera and frame.
     for i in 0..8 {
         let to = at.path().join(format!("images/cam{}/frame{:02}.png", i % 2, i / 2));

@@ -62,10 +62,10 @@ fn a_crop_box_is_drawn_inverted_undone_and_exported() {
     w.until("a picture of a third", |a| is_full(a) && picture(a) != before);
     assert!(w.shows(&format!("{inside} of {n} Gaussians")) && inside < n / 2);
     let third = picture(w.app());
-    w.click("Keep what is outside");
+    w.click("Invert");
     w.until("a picture of the rest", |a| is_full(a) && picture(a) != third);
     assert!(w.shows(&format!("{} of {n} Gaussians", n - inside)));
-    w.click("Keep what is outside");
+    w.click("Invert");
     w.until("the third", |a| picture(a) == third);
 
     w.harness.state_mut().layout.folder = Some(folder.path().to_path_buf());

@@ -106,5 +106,5 @@ fn what_is_unknown_is_counted_at_rest_and_can_be_marked() {
     assert!(w.shows("% of this view is unknown"));
     w.click("Mark it\u{2026}");
     w.harness.run_steps(5);
-    assert!(w.shows("Select a new object: click"), "the tool");
+    assert!(w.shows("New object: click"), "the tool");
 }

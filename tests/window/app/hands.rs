@@ -268,3 +268,36 @@ fn an_answer_says_why_nothing_of_it_is_drawn() {
     w.harness.run_steps(4);
     assert!(!w.shows("outside the crop box") && !w.shows("cropped"));
 }
+
+#[test]
+fn the_chat_asks_by_buttons_and_says_where_another_scene_begins() {
+    let folder = tempfile::tempdir().expect("folder");
+    let mut w = window(folder.path());
+    let say = |w: &mut Window, text: &str| {
+        w.press(Key::Enter);
+        w.types(text);
+        w.press(Key::Enter);
+    };
+    let name = |a: &App| a.state.semantics.as_ref().map(|m| m.identities.name(1)).unwrap_or_default();
+    assert!(!w.shows("Yes"));
+    let before = name(w.app());
+    say(&mut w, "rename box 0 to crate");
+    w.until("a question", |a| a.conversation().is_some_and(|talk| talk.contains("(yes or no)")));
+    w.harness.run_steps(2);
+    assert!(!w.shows("(yes or no)"), "there are buttons");
+    w.click("No");
+    w.until("an answer", |a| a.conversation().is_some_and(|talk| talk.contains("leave it as it is")));
+    w.harness.run_steps(2);
+    assert_eq!(name(w.app()), before);
+    assert!(w.harness.query_by_label("Yes").is_none(), "it is answered");
+    say(&mut w, "rename box 0 to crate");
+    w.until("the question again", |a| a.conversation().is_some_and(|talk| talk.matches("(yes or no)").count() == 4));
+    w.harness.run_steps(2);
+    w.click("Yes");
+    w.until("another name", |a| name(a) == "crate");
+    assert!(!w.shows("opened"));
+    w.ask(Action::Open(write_splat(folder.path())));
+    w.until("another scene", |a| a.state.scene.as_ref().is_some_and(|s| s.name == "dots"));
+    w.harness.run_steps(2);
+    assert!(w.shows("dots opened"));
+}

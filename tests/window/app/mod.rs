@@ -331,6 +331,37 @@ fn opening_something_else_while_a_job_runs_asks_first() {
 }
 
 #[test]
+fn quitting_while_a_job_runs_asks_once() {
+    let close = |w: &mut Window| {
+        let viewport = w.harness.input_mut().viewports.entry(egui::ViewportId::ROOT).or_default();
+        viewport.events.push(egui::ViewportEvent::Close);
+        w.harness.run_steps(2);
+        let sent = |w: &Window, command: &egui::ViewportCommand| {
+            let output = &w.harness.output().viewport_output[&egui::ViewportId::ROOT];
+            output.commands.contains(command)
+        };
+        sent(w, &egui::ViewportCommand::Close)
+    };
+    let mut w = Window::new(Some(Action::Open(photos())));
+    w.until("the photos", |a| a.state.scene.is_some());
+    close(&mut w);
+    assert!(!w.shows("still running"), "nothing is lost");
+    w.harness.state_mut().layout.config.steps = 50_000;
+    w.ask(Action::StartTraining);
+    w.until("training", |a| a.state.is_training());
+    assert!(!close(&mut w) && w.shows("goes on from its last checkpoint"));
+    w.click("Keep running");
+    assert!(w.app().state.is_training() && !w.shows("still running"));
+    close(&mut w);
+    w.click("Quit");
+    w.harness.step();
+    let output = &w.harness.output().viewport_output[&egui::ViewportId::ROOT];
+    assert!(output.commands.contains(&egui::ViewportCommand::Close));
+    w.ask(Action::Cancel);
+    w.until("the end", |a| a.state.job.is_none());
+}
+
+#[test]
 fn a_photo_that_is_broken_is_marked_and_the_rest_stays_usable() {
     let folder = tempfile::tempdir().expect("folder");
     let photos = folder.path().join("table");

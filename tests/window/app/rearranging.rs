@@ -93,7 +93,7 @@ fn a_box_is_recolored_and_doubled_and_a_hundred_steps_back_and_forth_lose_nothin
         assert!(w.shows("Apply"));
         tick(&mut w, "Color");
         if doubled {
-            tick(&mut w, "Leave it where it is, and do this to another one like it");
+            tick(&mut w, "Apply to a copy");
         }
         w.click("Apply");
         let before = states.last().expect("one").clone();

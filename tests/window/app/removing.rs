@@ -30,18 +30,20 @@ fn a_scene_without_a_box_is_seen_beside_and_opened() {
     let other = again.join("notes.txt");
     std::fs::write(&other, "mine").expect("a file");
     let answer = |w: &mut super::Window, answer: &str| {
-        w.click("Delete");
+        w.click("Options");
+        w.harness.run_steps(3);
+        w.click("Delete this scene\u{2026}");
         w.harness.run_steps(3);
         w.click(answer);
         w.harness.run_steps(3);
     };
-    answer(&mut w, "Delete it");
+    answer(&mut w, "Delete");
     assert!(again.join("scene.json").is_file());
     assert!(w.app().state.log.iter().any(|line| line.text.contains("holds more than the scene")));
     std::fs::remove_file(&other).expect("removed");
-    answer(&mut w, "Keep it");
+    answer(&mut w, "Cancel");
     assert!(again.join("scene.json").is_file() && w.app().state.comparison.is_some());
-    answer(&mut w, "Delete it");
+    answer(&mut w, "Delete");
     assert!(!again.exists() && made.join("scene.json").is_file() && w.app().state.comparison.is_none());
     w.ask(Action::Remove(2));
     w.until("it is made once more", |a| a.state.comparison.as_ref().is_some_and(|b| b.path == again));

@@ -67,7 +67,7 @@ fn a_click_selects_and_a_name_is_kept_and_asked_for() {
     let before = w.app().state.semantics.as_ref().expect("objects").identities.len();
     let box_1 = middle_of(&w, 2);
     w.ask(Action::SegmentNew(Some(0)));
-    assert!(w.shows("Select a new object: click on it"), "the tool says what to do");
+    assert!(w.shows("New object: click on it"), "the tool says what to do");
     w.until("a picture for it", |a| a.viewport.picture().is_some_and(|p| p.full));
     click(&mut w, box_1, Modifiers::NONE);
     w.until("an answer", |a| a.viewport.selection().is_some_and(|n| n > 0));

@@ -4,14 +4,12 @@ use std::collections::BTreeSet;
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use glam::DVec3;
-
-use super::{edits, remote};
+use super::{edits, remote, view};
 use crate::jobs::find_objects::{self, FindRequest, FindSettings};
 use crate::jobs::models::{self, Source};
 use crate::jobs::remove::{self as removal, RemovalOptions, RemoveRequest};
 use crate::pipeline::observer::Observer;
-use crate::scene::{Camera, IdentityId, SemanticMap};
+use crate::scene::{IdentityId, SemanticMap};
 use crate::ui::app::App;
 use crate::ui::dialogs::{DialogAnswer, Question};
 use crate::ui::file_dialogs::FileRequest;
@@ -138,23 +136,13 @@ pub(in crate::ui) fn segment_photo(app: &mut App) {
         // The search would begin with the state before the edit.
         return app.state.toast(Tone::Warning, "Objects are being changed; segment the photo once that is done.");
     }
-    let (scene, eye) = (app.state.scene.clone(), app.viewport.pose());
+    let scene = app.state.scene.clone();
     let Some(dataset) = scene.as_ref().and_then(|s| s.dataset.as_ref()) else {
         return app.state.toast(Tone::Warning, "This scene has no photos.");
     };
     let held: BTreeSet<usize> =
         scene.as_ref().map(|s| s.held_out(app.layout.config.holdout_every)).into_iter().flatten().collect();
-    let trained_on = (0..dataset.photos.len()).filter(|i| !held.contains(i));
-    let size = scene.as_ref().map_or(1.0, |s| s.home.bounds.radius());
-    let away = |camera: &Camera| {
-        let turn = 1.0 - (camera.world_from_camera * DVec3::Z).dot(eye.world_from_camera * DVec3::Z);
-        camera.center.distance(eye.center) / size + turn
-    };
-    let nearest = || {
-        let away = |i: &usize| away(&dataset.photos[*i].camera);
-        trained_on.min_by(|a, b| away(a).total_cmp(&away(b)))
-    };
-    let Some(photo) = app.viewport.photo_index().or_else(nearest) else { return };
+    let Some(photo) = app.viewport.photo_index().or_else(|| view::nearest_photo(app, &held)) else { return };
     let seed = dataset.photos[photo].name.clone();
     let step = FoundStep { what: format!("segmented {seed}"), adds: true };
     start_search(app, SearchScope { add: Some((known, seed)), ..SearchScope::default() }, Some(step));
@@ -279,12 +267,11 @@ pub(in crate::ui) fn ask_to_delete_removed(app: &mut App) {
     let Some(removed) = &app.state.removed else {
         return app.state.toast(Tone::Warning, "No scene was made by removing something from this one.");
     };
+    let (name, folder) = (&removed.name, removed.folder.display());
     let text = format!(
-        "Delete {}, the scene without {}? This cannot be undone; the scene that it was made of stays.",
-        removed.folder.display(),
-        removed.name
+        "Delete the copy without \u{201c}{name}\u{201d}? The original stays. This cannot be undone.\n\n{folder}"
     );
-    let question = Question { text, yes: "Delete it", other: None, no: "Keep it" };
+    let question = Question { text, yes: "Delete", other: None, no: "Cancel", deletes: true };
     app.put_question(question, |app, answer| {
         if answer == DialogAnswer::Yes {
             delete_removed(app);

@@ -188,7 +188,7 @@ fn built_in_means_need_no_download_and_say_what_they_cannot() {
     let mut harness = asked(told.clone());
     click(&mut harness, "Uniform color regions (built in)");
     click(&mut harness, "Only names that you give");
-    assert!(harness.query_by_label_contains("Words find nothing until you name things").is_some());
+    assert!(harness.query_by_label_contains("Objects will be unnamed").is_some());
     click(&mut harness, "Find objects");
     assert_eq!(told.so_far(), ["find"]);
     assert_eq!(chosen(&harness), ["regions", "none"]);

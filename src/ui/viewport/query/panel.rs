@@ -22,6 +22,9 @@ fn on_screen(ctx: &Context, name: &'static str) -> Option<Rect> {
 /// Size below which a view shows the answer as one word, points.
 const SMALL: Vec2 = vec2(540.0, 420.0);
 
+/// Least width of the card beside the view's own cards, points.
+const NARROWEST: f32 = 320.0;
+
 /// Width of the card in a view, points.
 pub(super) fn width_in(view: Rect) -> f32 {
     (view.width() - 410.0).clamp(300.0, 380.0).min(view.width() - 40.0)
@@ -53,12 +56,17 @@ pub(crate) fn show(
     };
     // In the corner, as the target is mostly in the middle.
     let mut at = Align2::RIGHT_TOP.pos_in_rect(&rect.shrink(MARGIN));
-    let width = width_in(rect);
+    let mut width = width_in(rect);
     for card in ["modes", "photo"].into_iter().filter_map(|name| on_screen(ui.ctx(), name)) {
         let card = card.translate(rect.min - first.min);
-        // Below the view's own cards if they reach that far.
-        if rect.intersects(card) && card.right() + MARGIN > at.x - width - 2.0 * MARGIN {
-            at.y = at.y.max(card.bottom() + 0.5 * MARGIN);
+        let room = at.x - card.right() - 3.0 * MARGIN;
+        if !rect.intersects(card) || room >= width {
+            continue;
+        }
+        // Beside the view's own cards, a little narrower; below them if they reach too far.
+        match room >= NARROWEST.min(width) {
+            true => width = room,
+            false => at.y = at.y.max(card.bottom() + 0.5 * MARGIN),
         }
     }
     let name = if queries.is_second() { "second question" } else { "question" };
@@ -105,6 +113,7 @@ fn contents(ui: &mut Ui, queries: &mut Queries, folding: Folding, scene: Searche
     if !is_folded {
         card::show(ui, queries, scene, cx);
         pins::show(ui, queries, scene.semantics);
+        ui.add_space(3.0);
     }
     focused
 }

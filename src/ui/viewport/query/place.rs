@@ -16,6 +16,11 @@ impl Queries {
         }
     }
 
+    /// True if an answer is on screen.
+    pub(in crate::ui::viewport) fn is_asked(&self) -> bool {
+        self.sides.iter().any(|side| side.live.is_some() || !side.pinned.is_empty())
+    }
+
     /// Numbers of the things that the query in the field found together, from 1; none if it found one.
     pub(in crate::ui::viewport) fn numbers(&self) -> Vec<(IdentityId, usize)> {
         let shown = self.side().live.as_ref().map(|q| q.shown(&self.side().settings)).unwrap_or_default();

@@ -120,7 +120,7 @@ fn numbers(ui: &mut Ui, crop: &mut CropBox, step: f64) {
             ui.end_row();
         }
     });
-    ui.checkbox(&mut crop.outside, "Keep what is outside").on_hover_text("Show what is not in the box instead.");
+    ui.checkbox(&mut crop.outside, "Invert").on_hover_text("Show what is not in the box instead.");
 }
 
 fn corner(bounds: &Bounds, i: usize) -> DVec3 {

@@ -291,12 +291,12 @@ impl ViewTool for SegmentTool {
         let all = state.semantics.as_ref().map_or(&none, |map| &map.identities);
         bottom_card(ui, "selecting", rect, 220.0..=460.0, |ui| {
             let what = match self.purpose {
-                SelectFor::New(NO_IDENTITY) => "a new object".to_owned(),
-                SelectFor::New(of) => format!("a new part of {}", all.full_name(of)),
-                SelectFor::Extent(id) => all.full_name(id),
+                SelectFor::New(NO_IDENTITY) => "New object".to_owned(),
+                SelectFor::New(of) => format!("New part of {}", all.full_name(of)),
+                SelectFor::Extent(id) => format!("Correct {}", all.full_name(id)),
             };
-            ui.label(format!("Select {what}: click on it or draw a line through it, in any view."));
-            ui.weak("Shift: not this. Backspace takes the last stroke back. Right-drag and wheel move the view.");
+            ui.label(format!("{what}: click on it or draw a line through it, in any view."));
+            ui.weak("Shift removes. Backspace undoes the last stroke. Right-drag and wheel move the view.");
             ui.horizontal(|ui| {
                 ui.selectable_value(&mut self.takes_away, false, "+ add");
                 ui.selectable_value(&mut self.takes_away, true, "\u{2212} remove");

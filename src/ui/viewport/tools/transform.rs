@@ -108,7 +108,10 @@ impl TransformTool {
         let at = Align2::LEFT_BOTTOM.pos_in_rect(&rect.shrink(12.0)) - vec2(0.0, 40.0);
         let area = Area::new(Id::unique("arranging")).order(Order::Foreground).pivot(Align2::LEFT_BOTTOM);
         theme::card(ui.ctx(), area.fixed_pos(at).constrain_to(rect), |ui| {
-            ui.label(format!("Arrange {}: drag its arrows, or type.", all.full_name(self.arrangement.id)));
+            ui.label(format!(
+                "Move \u{201c}{}\u{201d}: drag an arrow or type values",
+                all.full_name(self.arrangement.id)
+            ));
             ui.horizontal(|ui| {
                 ui.label("Move");
                 for (axis, name) in ["x", "y", "z"].into_iter().enumerate() {
@@ -137,7 +140,7 @@ impl TransformTool {
                     }
                 }
             });
-            ui.checkbox(&mut self.arrangement.duplicate, "Leave it where it is, and do this to another one like it");
+            ui.checkbox(&mut self.arrangement.duplicate, "Apply to a copy");
             ui.horizontal(|ui| {
                 let keep = Action::ApplyTransform;
                 let button = ui.add_enabled(self.is_something(), theme::primary_button("Apply"));

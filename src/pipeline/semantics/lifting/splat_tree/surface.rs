@@ -56,7 +56,7 @@ impl SplatSurface {
         observer: &mut dyn Observer,
     ) -> Result<Self, FindError> {
         let chosen: Vec<&Camera> = spread(cameras.len(), MOST_VIEWS).map(|i| &cameras[i]).collect();
-        let mut ticker = Ticker::new("Looking at surfaces", chosen.len() + 1);
+        let mut ticker = Ticker::new("Preparing selection", chosen.len() + 1);
         let mut colors = vec![[0.0_f32; 4]; cloud.len()];
         let mut looks = Vec::with_capacity(chosen.len());
         let mut renderer = Renderer::new();

@@ -204,7 +204,7 @@ impl Tracker<'_> {
 
     /// Measures the visibility of each Gaussian in every photo, before any votes.
     fn see(&mut self, observer: &mut dyn Observer) -> Result<(), FindError> {
-        let mut ticker = Ticker::new("Looking what each photo shows", self.photos.len());
+        let mut ticker = Ticker::new("Analyzing photos", self.photos.len());
         for (i, photo) in self.photos.iter().enumerate() {
             let camera = photo.camera.limited_to(SEE_SIDE_PX);
             self.votes

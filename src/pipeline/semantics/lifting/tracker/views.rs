@@ -32,7 +32,7 @@ impl Tracker<'_> {
         of: &[IdentityId],
         observer: &mut dyn Observer,
     ) -> Result<Vec<ViewReport>, FindError> {
-        let mut ticker = Ticker::new("Looking what is known in each photo", self.photos.len());
+        let mut ticker = Ticker::new("Checking labels", self.photos.len());
         observer.proceed()?;
         let mut views = Vec::with_capacity(self.photos.len());
         for photo in 0..self.photos.len() {
