@@ -366,7 +366,7 @@ fn act(
         }
         ToolCall::Remove { .. } => {
             world.remove(id).map_err(failed)?;
-            format!("Making a copy of this scene without {it}.")
+            format!("Making a copy of this scene without {it}; this one stays as it is.")
         }
         ToolCall::Rename { name, .. } => {
             world.rename(id, name).map_err(failed)?;

@@ -93,7 +93,7 @@ impl SplatFormat {
             (_, SplatRenderMode::Plain) | (Self::Ply | Self::CompressedPly | Self::Sog | Self::SogFolder, _) => None,
             (Self::Spz, SplatRenderMode::Mip) => None,
             (_, SplatRenderMode::Mip) => Some("anti-aliasing flag (Mip-Splatting)"),
-            (_, SplatRenderMode::Surfels) => Some("surfel flag"),
+            (_, SplatRenderMode::Surfels) => Some("flag of surfels"),
         };
         all.extend(mode.map(str::to_owned));
         if self == Self::Splat && self.shift(cloud).is_some() {

@@ -8,7 +8,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use crossbeam_channel::{Receiver, Sender, bounded};
 use egui::{Button, Id, Key, Modifiers, Response, RichText, ScrollArea, TextEdit, Ui};
 
-use super::chat_lines::{self, Answer, Line};
+use super::chat_lines::{self, ChatAnswer, Line};
 pub(crate) use super::chat_model::ChatSettings;
 use super::chat_model::ModelChooser;
 use super::ctx::Ctx;
@@ -64,7 +64,7 @@ struct Request {
 enum News {
     Event(AgentEvent),
     Effect(Effect),
-    Reply { answer: Answer, transcript: [String; 2] },
+    Reply { answer: ChatAnswer, transcript: [String; 2] },
 }
 
 /// The conversation with the agent.
@@ -156,7 +156,7 @@ impl Chat {
 
     /// Adds an answer of the window itself.
     pub(crate) fn answer(&mut self, text: &str) {
-        self.lines.push(Line::Answer(Answer::new(text)));
+        self.lines.push(Line::Answer(ChatAnswer::new(text)));
     }
 
     /// Moves the keyboard focus to the box.
@@ -296,7 +296,7 @@ impl Agent {
     fn carry_out(&mut self, request: Request) {
         let Request { text, snapshot, settings, cancel } = request;
         if let Err(problem) = self.get_ready(snapshot, settings) {
-            self.reply(Answer::new(&problem), [String::new(), String::new()]);
+            self.reply(ChatAnswer::new(&problem), [String::new(), String::new()]);
             return;
         }
         let (Some((_, session)), Some((_, world))) = (&mut self.session, &mut self.world) else { return };
@@ -314,10 +314,10 @@ impl Agent {
             _ => (reply.text, false),
         };
         let (candidates, refused) = (names.collect(), reply.refused);
-        self.reply(Answer { candidates, refused, asks, ..Answer::new(&text) }, transcript);
+        self.reply(ChatAnswer { candidates, refused, asks, ..ChatAnswer::new(&text) }, transcript);
     }
 
-    fn reply(&self, answer: Answer, transcript: [String; 2]) {
+    fn reply(&self, answer: ChatAnswer, transcript: [String; 2]) {
         let _ = self.news.send(News::Reply { answer, transcript });
         (self.repaint)();
     }

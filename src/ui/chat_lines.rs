@@ -19,14 +19,14 @@ const CANDIDATES: usize = 8;
 pub(super) enum Line {
     Said(String),
     Did(String, Option<bool>),
-    Answer(Answer),
+    Answer(ChatAnswer),
     /// Another scene was opened.
     Opened(String),
 }
 
 /// Answer of the agent.
 #[derive(Default)]
-pub(super) struct Answer {
+pub(super) struct ChatAnswer {
     pub(super) text: String,
     pub(super) candidates: Vec<(IdentityId, String)>,
     pub(super) refused: Option<Refusal>,
@@ -34,7 +34,7 @@ pub(super) struct Answer {
     pub(super) asks: bool,
 }
 
-impl Answer {
+impl ChatAnswer {
     /// An answer in words; they may come from a model.
     pub(super) fn new(said: &str) -> Self {
         Self { text: text::lines(said).into_owned(), ..Self::default() }
@@ -110,7 +110,7 @@ fn show_line(ui: &mut Ui, line: &Line, object_thumbnails: &ObjectThumbnails, can
             ui.separator();
             ui.label(RichText::new(format!("{} opened", text::elided(name, 48))).small().color(theme::weak()));
         }
-        Line::Answer(Answer { text, candidates, refused, asks }) => {
+        Line::Answer(ChatAnswer { text, candidates, refused, asks }) => {
             ui.horizontal_wrapped(|ui| {
                 // What the user stopped is no failure.
                 if refused.as_ref().is_some_and(|r| r.kind != RefusalKind::Stopped) {

@@ -159,7 +159,7 @@ fn a_request_that_ends_at_a_question_is_no_success() {
     let ask = |more: &[&str]| fmlgs(&[&["agent", scene.to_str().unwrap()], more].concat());
     let before = names_in(folder.path());
     let said = ask(&["remove box 1"]).fails_with(1).stderr;
-    assert!(said.contains("waits for an answer, so it was not carried out (Remove "), "{said}");
+    assert!(said.contains("waits for an answer, so it was not carried out (Make a copy "), "{said}");
     let told = ask(&["remove box 1", "--json"]).fails_with(1);
     assert_eq!(told.json()["requests"][0]["awaits"], "Confirmation");
     assert!(told.stderr.contains("waits for an answer"), "{}", told.stderr);

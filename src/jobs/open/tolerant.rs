@@ -36,7 +36,7 @@ pub(crate) fn known_objects(scene: &Scene, observer: &mut dyn Observer) -> Optio
             observer.note(
                 Severity::Warning,
                 format!(
-                    "The scene's objects cannot be loaded: {e}. Find them again (Objects pane, or fmlgs preprocess)"
+                    "The scene's objects cannot be loaded: {e}. Find them again (Find objects and parts, or fmlgs preprocess)"
                 ),
             );
             None

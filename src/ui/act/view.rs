@@ -180,7 +180,7 @@ pub(in crate::ui) fn hide(app: &mut App, id: IdentityId) {
 fn objects(app: &mut App) -> Option<Versioned<SemanticMap>> {
     let map = app.state.semantics.clone();
     if map.is_none() {
-        app.state.toast(Tone::Info, "There are no objects yet: find them first (Objects pane).");
+        app.state.toast(Tone::Info, "There are no objects yet: find them first (Ctrl+P, Find objects and parts).");
     }
     map
 }

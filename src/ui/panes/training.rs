@@ -129,7 +129,7 @@ fn settings(ui: &mut Ui, config: &mut TrainConfig, largest_px: u32) {
         // Small photos limit the range shown here, not the stored setting.
         let range = 64..=largest_px.clamp(65, 4096);
         let mut side = config.max_side_px.clamp(64, *range.end());
-        if ui.add(Slider::new(&mut side, range).suffix(" px").step_by(8.0)).labelled_by(id).changed() {
+        if ui.add(Slider::new(&mut side, range).suffix(" px")).labelled_by(id).changed() {
             config.max_side_px = side;
         }
         ui.end_row();

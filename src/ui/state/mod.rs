@@ -381,8 +381,12 @@ impl AppState {
             Some(origin) => return Some(format!("Nothing to query yet: no objects are known on {}.", origin.host)),
             None if self.is_training() => "Nothing to query while training runs: objects come after it.",
             None if self.is_running(Makes::Objects) => "Nothing to query yet: objects are being found.",
-            None if !self.is_trained() => "Nothing to query yet: train, then find objects first (Objects pane).",
-            None if scene.dataset.is_some() => "Nothing to query yet: find objects first (Objects pane).",
+            None if !self.is_trained() => {
+                "Nothing to query yet: train, then find objects first (Ctrl+P, Find objects and parts)."
+            }
+            None if scene.dataset.is_some() => {
+                "Nothing to query yet: find objects first (Ctrl+P, Find objects and parts)."
+            }
             None => {
                 "Nothing to query yet: select an object by clicks first (Ctrl+P, \u{201c}select a new object\u{201d})."
             }

@@ -7,7 +7,7 @@ use egui::{Color32, ColorImage, CursorIcon, Rect, Sense, Stroke, TextureHandle, 
 
 use crate::scene::{Camera, Photo, PhotoPixels};
 use crate::ui::theme;
-use crate::worker::{Task, Tasks, load_photo};
+use crate::worker::{Task, Tasks, ViewMode, load_photo};
 
 /// Step of an arrow key at the split between photo and rendering, as a share of the frame.
 const KEY_STEP: f32 = 0.05;
@@ -78,8 +78,8 @@ impl PhotoView {
         (2.0 * ((0.5 * fov_y_rad).tan() * self.margin).atan()).clamp(0.1, 2.2)
     }
 
-    /// Draws the photo right of the split, and the handle of the split.
-    pub(super) fn show_split(&mut self, ui: &mut Ui, shown: Rect, split: &mut f32) {
+    /// Draws the photo right of the split, and the handle of the split; the rendering on the left shows `mode`.
+    pub(super) fn show_split(&mut self, ui: &mut Ui, shown: Rect, mode: ViewMode, split: &mut f32) {
         let Some(pixels) = &self.pixels else { return };
         let texture = self.texture.get_or_insert_with(|| {
             let size = [pixels.width_px as usize, pixels.height_px as usize];
@@ -111,8 +111,8 @@ impl PhotoView {
         };
         ui.painter().vline(x, shown.y_range(), Stroke::new(1.5, color));
         ui.painter().circle(pos2(x, shown.center().y), 9.0, theme::panel(), Stroke::new(1.5, color));
-        for (side, text, align) in
-            [(-1.0, "Rendering", egui::Align2::RIGHT_BOTTOM), (1.0, "Photo", egui::Align2::LEFT_BOTTOM)]
+        let left = if mode == ViewMode::Rgb { "Rendering" } else { mode.text() };
+        for (side, text, align) in [(-1.0, left, egui::Align2::RIGHT_BOTTOM), (1.0, "Photo", egui::Align2::LEFT_BOTTOM)]
         {
             let at = pos2(x + side * 10.0, shown.bottom() - 12.0);
             let font = egui::FontId::proportional(12.5);

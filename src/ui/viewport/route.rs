@@ -19,10 +19,20 @@ pub(crate) struct CameraRoute {
     pub(crate) plays: bool,
 }
 
-/// Draws the loaded clip, the keyframes of the path, and the keypoints of the scene, as `eye` sees them.
+/// Draws the loaded clip, the keyframes of the path, and the keypoints of the scene, as `eye` sees them; nothing while
+/// the clip plays.
 pub(super) fn show(ui: &Ui, rect: Rect, eye: &Camera, route: &CameraRoute, explored: Option<&Explored>) {
     let painter = ui.painter_at(rect);
-    let place = |p: DVec3| eye.project(p).map(|q| pos2(rect.left() + q.x as f32, rect.top() + q.y as f32));
+    if route.plays {
+        return;
+    }
+    // From a place on the way, what is nearest would cross the whole view.
+    let far = route.way.iter().map(|p| p.distance(eye.center)).fold(0.0, f64::max);
+    let near = (0.02 * far).max(1e-6 * (1.0 + eye.center.length()));
+    let place = |p: DVec3| {
+        let at = eye.project(p).filter(|_| p.distance(eye.center) > near)?;
+        Some(pos2(rect.left() + at.x as f32, rect.top() + at.y as f32))
+    };
     if let Some(explored) = explored.filter(|_| route.show_reach) {
         for (keypoint, part) in explored.navigator.graph.keypoints.iter().zip(&explored.parts) {
             let Some(at) = place(keypoint.center).filter(|at| rect.contains(*at)) else { continue };

@@ -131,7 +131,7 @@ impl Viewport {
                 self.queries.paint(ui, area.shown, semantics, lit);
             }
             if let Some(photo) = self.photo.as_mut().filter(|_| cx.layout.compare && !area.second) {
-                photo.show_split(ui, area.shown, &mut cx.layout.split);
+                photo.show_split(ui, area.shown, cx.layout.mode, &mut cx.layout.split);
             }
             if with_cameras {
                 let eye = self.display.overlay_camera(&self.eye, area.rect);

@@ -105,7 +105,7 @@ fn a_good_model_is_heard_step_by_step() {
     // The model hears what came of its calls, and the scene as data.
     let seen = t.server.seen.lock().expect("log").clone();
     assert_eq!(seen.len(), 3);
-    assert!(seen[1].body.contains("Here is the handle · kettle"), "{}", seen[1].body);
+    assert!(seen[1].body.contains("Here is the handle of the kettle"), "{}", seen[1].body);
     let body = seen[0].json();
     assert_eq!(body["tools"].as_array().map(Vec::len), Some(fmlgs::agent::tool::NAMES.len()));
     let message = body["messages"][1]["content"].as_str().expect("a message");

@@ -9,8 +9,17 @@ fn all_objects_being_exported() {
     first_version(folder.path());
     let at = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
     let export = |out: &str| command(&["segment", &at("scene"), "--all", "--out", &at(out), "-q"]);
-    let longest = time(&mut export("whole"));
-    kill_often("segment --all", longest, &mut |_| export("out"), &mut || ());
+    // The first run also reads the program from the disk.
+    let longest = time(&mut export("first")).min(time(&mut export("whole")));
+    let is_whole = || files_in(&folder.path().join("out")) == files_in(&folder.path().join("whole"));
+    let mut start = |_| {
+        // Where all is there already, there is nothing left to be killed at.
+        if folder.path().join("out").is_dir() && is_whole() {
+            std::fs::remove_dir_all(folder.path().join("out")).unwrap();
+        }
+        export("out")
+    };
+    kill_often("segment --all", longest, &mut start, &mut || ());
     Done::from(export("out").output().unwrap()).ok();
     assert_tidy(&folder.path().join("out"));
     let [whole, out] = ["whole", "out"].map(|name| files_in(&folder.path().join(name)));

@@ -90,6 +90,26 @@ fn a_click_selects_and_a_name_is_kept_and_asked_for() {
     w.until("found", |a| a.viewport.queries.found() == [before as u32 + 1]);
     w.ask(Action::Undo);
     w.until("undone", |a| a.state.semantics.as_ref().is_some_and(|m| m.identities.len() == before));
+
+    // Kept by Enter after its name, or with the tool ready for the next one.
+    for (name, next) in [("tub", false), ("vat", true)] {
+        w.ask(Action::SegmentNew(Some(0)));
+        w.until("a picture for it", |a| a.viewport.picture().is_some_and(|p| p.full));
+        click(&mut w, box_1, Modifiers::NONE);
+        w.until("an answer", |a| a.viewport.selection().is_some_and(|n| n > 0));
+        w.harness.get_by_label("Name of what is selected").click();
+        w.harness.run_steps(2);
+        w.types(name);
+        match next {
+            true => w.harness.get_by_label("Keep and next").click(),
+            false => w.press(Key::Enter),
+        }
+        let known =
+            |a: &App| a.state.semantics.as_ref().is_some_and(|m| m.identities.iter().any(|(_, i)| i.names == [name]));
+        w.until("it is kept", known);
+        w.harness.run_steps(2);
+        assert_eq!(w.shows("New object: click on it"), next);
+    }
 }
 
 #[test]

@@ -306,7 +306,10 @@ impl ViewTool for SegmentTool {
                 ui.horizontal(|ui| {
                     ui.label("Keep as");
                     let name = TextEdit::singleline(&mut self.name).hint_text("Name").char_limit(80);
-                    ui.add(name.desired_width(130.0)).accessible_name("Name of what is selected");
+                    let name = ui.add(name.desired_width(130.0)).accessible_name("Name of what is selected");
+                    if name.lost_focus() && ui.input(|i| i.key_pressed(Key::Enter)) && !self.is_empty() {
+                        cx.ask(Action::AddPainted);
+                    }
                     let text =
                         if of == NO_IDENTITY { "an object".to_owned() } else { format!("part of {}", all.label(of)) };
                     let whole = ComboBox::from_id_salt("whole").selected_text(text).width(120.0);
@@ -323,6 +326,13 @@ impl ViewTool for SegmentTool {
             ui.horizontal(|ui| {
                 if ui.add_enabled(!self.is_empty(), theme::primary_button("Keep")).clicked() {
                     cx.ask(Action::AddPainted);
+                }
+                if let SelectFor::New(of) = self.purpose {
+                    let next = ui.add_enabled(!self.is_empty(), egui::Button::new("Keep and next"));
+                    if next.on_hover_text("Keep it, and select another one.").clicked() {
+                        cx.ask(Action::AddPainted);
+                        cx.ask(Action::SegmentNew(Some(of)));
+                    }
                 }
                 if ui.add_enabled(self.has_strokes(), egui::Button::new("Undo stroke")).clicked() {
                     self.take_back();

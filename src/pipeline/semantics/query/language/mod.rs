@@ -251,8 +251,20 @@ pub(crate) fn ask(
     }
     let mut best = best?;
     best.readings = sentences.len();
+    best.unmet.iter_mut().for_each(|unmet| say_as_typed(unmet, text));
     said::complete(scene, &mut best);
     Some(best)
+}
+
+/// Names the words that are a reason as they were typed: "boots", not "boot".
+fn say_as_typed(unmet: &mut Unmet, text: &str) {
+    for word in &mut unmet.words {
+        let typed = tokens::tokens(text).into_iter().map(|t| t.low).find(|typed| singular(typed) == *word);
+        if let Some(typed) = typed.filter(|typed| typed != word) {
+            unmet.text = unmet.text.replace(&format!("\u{201c}{word}\u{201d}"), &format!("\u{201c}{typed}\u{201d}"));
+            *word = typed;
+        }
+    }
 }
 
 fn answer<'a>(
