@@ -70,7 +70,8 @@ impl AskedScene {
         let view = Some(Viewpoint { eye, forward, up: self.up });
         let talk = SpokenOf { group: last.clone(), last };
         let place = QueryPlace { view, meters: self.meters, talk, gone: self.gone.clone() };
-        let scene = QueryScene { identities: &self.identities, level: LevelFilter::Auto, place: &place, by_names: true };
+        let scene =
+            QueryScene { identities: &self.identities, level: LevelFilter::Auto, place: &place, by_names: true };
         let (mended, sentences) = hear(&self.identities, text.trim());
         let understood = ask(&scene, &mended.text, &sentences, None)?;
         let settled = understood.found.settled();
