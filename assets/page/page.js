@@ -35,8 +35,8 @@ async function start() {
         return line;
     };
 
-    // `asked` is the last answer, which "it" and Enter refer to.
-    const state = { selected: [], hidden: new Set(), flying: null, asked: null };
+    // `asked` is the last answer, to which Enter flies; `talked` is what "it" stands for in a question.
+    const state = { selected: [], hidden: new Set(), flying: null, asked: null, talked: null };
     const camera = { pose: null, distance: scene.distance, nearest: scene.distance * 1e-3 };
     let drawn = null;
     let player = null;

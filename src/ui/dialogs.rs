@@ -73,12 +73,9 @@ impl Question {
             egui::ScrollArea::vertical().max_height(260.0).show(ui, |ui| ui.label(text::lines(&self.text)));
             ui.add_space(12.0);
             ui.horizontal(|ui| {
+                let button = if self.deletes { theme::delete_button } else { theme::primary_button };
                 let answers = [
-                    (
-                        ui.add(if self.deletes { theme::delete_button } else { theme::primary_button }(self.yes))
-                            .clicked(),
-                        DialogAnswer::Yes,
-                    ),
+                    (ui.add(button(self.yes)).clicked(), DialogAnswer::Yes),
                     (self.other.is_some_and(|other| ui.button(other).clicked()), DialogAnswer::Other),
                     (ui.button(self.no).clicked(), DialogAnswer::No),
                 ];

@@ -1,8 +1,8 @@
 //! A scene as one HTML page that opens in any browser without a server and loads nothing from outside.
 //!
 //! `assets/page` has its text, style and scripts; the renderer is the PlayCanvas engine, made into one file by
-//! `tools/page`, and the language of questions is this program's, built as WebAssembly there. Names and titles enter as escaped text or as JSON that no tag can end, and only scripts with a listed
-//! checksum run.
+//! `tools/page`, and the language of questions is this program's, built as WebAssembly there. Names and titles enter as
+//! escaped text or as JSON that no tag can end, and only scripts with a listed checksum run.
 
 pub(crate) mod packed;
 
@@ -22,7 +22,12 @@ const TEMPLATE: &str = include_str!("../../../assets/page/page.html");
 const STYLE: &str = include_str!("../../../assets/page/page.css");
 const RENDERER: &[u8] = include_bytes!("../../../assets/page/renderer.js");
 const LANGUAGE: &[u8] = include_bytes!("../../../assets/page/language.wasm");
-const LICENSE: &str = include_str!("../../../assets/page/renderer.LICENSE.txt");
+/// Licenses of the renderer, and of the word list in the language.
+const LICENSES: &str = concat!(
+    include_str!("../../../assets/page/renderer.LICENSE.txt"),
+    "\n\n",
+    include_str!("../../../assets/lexicon.LICENSE.txt")
+);
 /// Scripts, joined into one in this order.
 const SCRIPTS: [&str; 9] = [
     include_str!("../../../assets/page/decode.js"),
@@ -135,10 +140,10 @@ impl Page {
     pub(crate) fn html(&self) -> std::io::Result<String> {
         let script = format!("(() => {{\n'use strict';\n{}}})();\n", SCRIPTS.join("\n"));
         // A scene without objects is not asked.
-        let asked =
-            self.asked.as_ref().map(|asked| [&asked.scene[..], LANGUAGE, asked.words.as_bytes()].map(packed_text));
-        let [asked, language, words] =
-            asked.unwrap_or_else(|| [Ok(String::new()), Ok(String::new()), Ok(String::new())]);
+        let [asked, language, words] = match &self.asked {
+            Some(asked) => [&asked.scene[..], LANGUAGE, asked.words.as_bytes()].map(packed_text),
+            None => [(); 3].map(|()| Ok(String::new())),
+        };
         let fields = [
             ("policy", policy(&script, self.asked.is_some())),
             ("version", env!("CARGO_PKG_VERSION").to_owned()),
@@ -146,7 +151,7 @@ impl Page {
             ("facts", escape_all_quotes(&self.facts).into_owned()),
             ("date", escape_all_quotes(&self.date).into_owned()),
             ("style", STYLE.to_owned()),
-            ("license", escape_all_quotes(LICENSE).into_owned()),
+            ("license", escape_all_quotes(LICENSES).into_owned()),
             // Without `<` the text cannot end the element.
             ("scene", serde_json::to_string(&self.scene)?.replace('<', "\\u003c")),
             ("gaussians", packed_text(&self.gaussians)?),

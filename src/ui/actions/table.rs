@@ -212,7 +212,7 @@ macro_rules! action_table {
                 => open::compare_scene(app, path);
             ToggleDim: "Dim everything else", "Darken everything except answers and the selection.", "9"
                 => app.layout.dim = !app.layout.dim;
-            ToggleCameras: "Show or hide cameras", "Show the camera of every photo in the view.", "V"
+            ToggleCameras: "Show or hide cameras", "Show the cameras of the nearest photos, while nothing is asked for, selected or in use.", "V"
                 => app.layout.cameras = !app.layout.cameras;
             TogglePane(pane: Pane): format!("Show or hide the {} pane", pane.text().to_lowercase()),
                 "Show or hide this pane." => app.layout.toggle(pane);
