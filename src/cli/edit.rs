@@ -8,7 +8,7 @@ use glam::{DQuat, DVec3};
 use super::progress::Console;
 use super::scene_args::open_scene;
 use super::{CliError, output};
-use crate::jobs::rearrange::{self, Arrangement, Placement, SplatEdit};
+use crate::jobs::rearrange::{self, Arrangement, Grade, Placement, SplatEdit};
 use crate::jobs::{JobError, derived, query};
 use crate::math::{format, srgb};
 use crate::scene::LevelFilter;
@@ -21,7 +21,8 @@ use crate::scene::LevelFilter;
 #[command(after_help = "Examples:\n  \
     fmlgs edit scene/ \"the mug\" --move 0.5,0,0 --turn 90 --out moved/\n  \
     fmlgs edit scene/ \"the mug\" --duplicate --move 0,0,1 --scale 0.5 --out two_mugs/\n  \
-    fmlgs edit scene/ \"handle of the mug\" --color #c02020 --out red_handle.ply")]
+    fmlgs edit scene/ \"handle of the mug\" --color #c02020 --out red_handle.ply\n  \
+    fmlgs edit scene/ \"the mug\" --brightness 1.3 --saturation 0.8 --out brighter/")]
 #[command(group = clap::ArgGroup::new("what").required(true).multiple(true))]
 pub(crate) struct EditArgs {
     /// Trained scene with objects and parts ('fmlgs preprocess')
@@ -49,6 +50,15 @@ pub(crate) struct EditArgs {
     /// Give it another color; its shades stay
     #[arg(long, value_name = "#RRGGBB", value_parser = color, group = "what")]
     color: Option<[f32; 3]>,
+    /// Make its colors this many times as bright
+    #[arg(long, value_name = "FACTOR", group = "what")]
+    brightness: Option<f64>,
+    /// Make its colors this many times as strong; 0 is gray
+    #[arg(long, value_name = "FACTOR", group = "what")]
+    saturation: Option<f64>,
+    /// Tint it: white becomes this color, at its brightness
+    #[arg(long, value_name = "#RRGGBB", value_parser = color, group = "what")]
+    tint: Option<[f32; 3]>,
     /// Level of the answer: an object or a part
     #[arg(long, value_enum, default_value_t = LevelFilter::Auto)]
     kind: LevelFilter,
@@ -92,7 +102,13 @@ pub(crate) fn run(args: EditArgs, quiet: bool) -> Result<(), CliError> {
         turn: DQuat::from_axis_angle(axis, args.turn.unwrap_or_default().to_radians()),
         scale: args.scale.unwrap_or(1.0),
     };
-    let edit = SplatEdit::Arrange(Arrangement { id, duplicate: args.duplicate, to, color: args.color });
+    let none = Grade::default();
+    let grade = Grade {
+        brightness: args.brightness.unwrap_or(none.brightness),
+        saturation: args.saturation.unwrap_or(none.saturation),
+        tint: args.tint.unwrap_or(none.tint),
+    };
+    let edit = SplatEdit::Arrange(Arrangement { id, duplicate: args.duplicate, to, color: args.color, grade });
     let (cloud, new) = rearrange::apply(&scene.cloud, Some(&map), &edit)?;
     let cloud = Arc::new(cloud);
     derived::write(&scene, derived::EDITED, &cloud, new.as_ref(), &args.out, &mut Console::new(quiet))?;

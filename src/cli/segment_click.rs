@@ -6,8 +6,9 @@ use std::sync::Arc;
 use super::export::MeasureArgs;
 use super::progress::Console;
 use super::{CliError, output, view};
+use crate::io::scene_files::SELECTION_FILE;
 use crate::jobs::edit::{self, EditRequest};
-use crate::jobs::select::{self, SelectFor, SelectRequest, SelectStep, Selected, Stroke, kept_as};
+use crate::jobs::select::{self, PrepareRequest, SelectFor, SelectRequest, SelectStep, Selected, Stroke, kept_as};
 use crate::jobs::{Scene, query};
 use crate::scene::{LevelFilter, Mask, NO_IDENTITY};
 
@@ -62,6 +63,14 @@ pub(crate) fn run(
     let camera = full.limited_to(SIDE_PX);
     let scale = camera.width_px as f32 / full.width_px as f32;
     let mut console = Console::new(quiet);
+    let request = PrepareRequest {
+        cloud: Arc::clone(&scene.cloud),
+        settings: scene.settings.clone(),
+        cameras: scene.views(),
+        home: scene.home(),
+        file: scene.folder.as_ref().map(|folder| folder.join(SELECTION_FILE)),
+    };
+    let prepared = Arc::new(select::prepare(&request, &mut console)?);
     let mut selected: Option<Arc<Selected>> = None;
     let clicks = args.click.iter().map(|at| (at, true)).chain(args.click_out.iter().map(|at| (at, false)));
     for (at, is_plus) in clicks {
@@ -79,10 +88,9 @@ pub(crate) fn run(
         let request = SelectRequest {
             cloud: Arc::clone(&scene.cloud),
             settings: scene.settings.clone(),
-            cameras: scene.views(),
-            home: scene.home(),
             map: Arc::clone(&map),
             purpose: purpose.clone(),
+            prepared: Some(Arc::clone(&prepared)),
             before: selected,
             step: SelectStep::Stroke(stroke),
         };

@@ -13,6 +13,8 @@ pub const CLOUD_FILE: &str = "point_cloud.ply";
 pub const MAP_FILE: &str = "semantic_map.safetensors";
 /// State of a training run, if it can be resumed.
 pub const CHECKPOINT_FILE: &str = "checkpoint.bin";
+/// Preparation for selections: made anew if it is missing.
+pub(crate) const SELECTION_FILE: &str = "selection_tree.safetensors";
 /// Journal of a save that is decided and not yet carried out.
 pub(super) const JOURNAL: &str = ".fmlgs_commit.json";
 

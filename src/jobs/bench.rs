@@ -4,7 +4,8 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use super::JobError;
-use super::select::{self, SelectFor, SelectRequest, SelectStep, Stroke};
+use super::select::{self, PrepareRequest, SelectFor, SelectRequest, SelectStep, Stroke};
+use crate::io::scene_files::SELECTION_FILE;
 use crate::io::scene_files::is_scene;
 use crate::io::splat_format::SplatFormat;
 use crate::io::{self, Opened};
@@ -120,26 +121,30 @@ fn strokes(
     let home = HomeView::new(&cameras, Some(cloud));
     let camera = home.camera(STROKES_SIZE).limited_to(STROKES_SIZE[0]);
     let map = Arc::new(select::empty_map(cloud));
-    let (mut values, mut before) = (StageValues::on_scene(name, cloud.len(), STROKES_SIZE), None);
-    for k in 0..=count {
+    let mut values = StageValues::on_scene(name, cloud.len(), STROKES_SIZE);
+    let settings = RenderSettings::default();
+    let folder = tempfile::tempdir().map_err(|e| StudyError(format!("no temporary folder: {e}")))?;
+    let (cloud, file) = (Arc::clone(cloud), Some(folder.path().join(SELECTION_FILE)));
+    let request = PrepareRequest { cloud: Arc::clone(&cloud), settings: settings.clone(), cameras, home, file };
+    values.time("prepare", || select::prepare(&request, observer))?;
+    let prepared = Arc::new(values.time("prepare again", || select::prepare(&request, observer))?);
+    let mut before = None;
+    for k in 0..count {
         observer.proceed()?;
         let size = [camera.width_px as usize, camera.height_px as usize];
         // The third stroke of each selection takes away, the others add.
         let pixels = stroke(k, size);
         let request = SelectRequest {
-            cloud: Arc::clone(cloud),
-            settings: RenderSettings::default(),
-            cameras: cameras.clone(),
-            home: home.clone(),
+            cloud: Arc::clone(&cloud),
+            settings: settings.clone(),
             map: Arc::clone(&map),
             purpose: SelectFor::New(NO_IDENTITY),
-            before,
+            prepared: Some(Arc::clone(&prepared)),
+            before: before.take(),
             step: SelectStep::Stroke(Stroke { camera: camera.clone(), pixels, is_plus: k % 3 != 2 }),
         };
-        // The first one makes everything ready.
-        let stage = if k == 0 { "first stroke" } else { "stroke" };
-        let selected = values.time(stage, || select::run(&request, observer))?;
-        before = Some(Arc::new(if k % 3 == 2 { selected.begun_anew() } else { selected }));
+        let selected = values.time("stroke", || select::run(&request, observer))?;
+        before = (k % 3 != 2).then(|| Arc::new(selected));
     }
     Ok(values.samples())
 }

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use super::{JobError, Scene, derived, open};
 use crate::io::SceneFolder;
-pub(crate) use crate::pipeline::splat_edit::{Arrangement, Placement, SplatEdit, apply};
+pub(crate) use crate::pipeline::splat_edit::{Arrangement, Grade, Placement, SplatEdit, apply};
 use crate::scene::{Camera, GaussianCloud, SceneFacts, SemanticMap};
 
 /// Returns the Gaussians of `scene` and its objects and parts, if it has any, after an edit.

@@ -1,19 +1,26 @@
-//! Selection by clicks and strokes: the selected Gaussians, and a preview of objects and parts with them.
+//! Selection of Gaussians by clicks, strokes and areas: the selected ones, and a preview of objects and parts with them.
 
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Instant;
 
 use glam::DMat3;
 
-use super::JobError;
-use crate::pipeline::observer::Observer;
+use super::{JobError, export};
+use crate::io::{atomic, files};
+use crate::pipeline::cleaning::neighbors::SplatNeighbors;
+use crate::pipeline::observer::{Observer, Severity};
 use crate::pipeline::semantics::lifting::edit::{self, Edit};
 use crate::pipeline::semantics::lifting::splat_tree::hierarchy::Hierarchy;
 pub use crate::pipeline::semantics::lifting::splat_tree::marks::Stroke;
 use crate::pipeline::semantics::lifting::splat_tree::marks::StrokeMarks;
+use crate::pipeline::semantics::lifting::splat_tree::stored;
 use crate::pipeline::semantics::query::timing::ms_since;
 use crate::render::{RenderSettings, Renderer};
 use crate::scene::{Camera, GaussianCloud, HomeView, Identities, IdentityId, NO_IDENTITY, SemanticMap};
+
+/// Largest kept preparation, bytes.
+const MAX_KEPT_BYTES: u64 = 4 << 30;
 
 /// Purpose of a selection.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -24,15 +31,50 @@ pub enum SelectFor {
     Extent(IdentityId),
 }
 
-/// Action of a selection step.
+/// Change of a selection.
 #[derive(Clone, Debug)]
 pub enum SelectStep {
-    /// Prepare for the first stroke.
-    Prepare,
-    /// Add a stroke.
+    /// A click or line on what to add or remove; the only one that needs a preparation.
     Stroke(Stroke),
-    /// Undo the last stroke.
+    /// These Gaussians (indices) are added.
+    Add(Vec<u32>),
+    /// These Gaussians are removed.
+    Remove(Vec<u32>),
+    /// The neighbors of the selected Gaussians are added.
+    Grow,
+    /// Gaussians with an unselected neighbor are removed.
+    Shrink,
+    /// The last change is undone.
     TakeBack,
+}
+
+/// Request to prepare a scene for strokes.
+#[derive(Clone, Debug)]
+pub struct PrepareRequest {
+    pub(crate) cloud: Arc<GaussianCloud>,
+    pub(crate) settings: RenderSettings,
+    /// The photos' cameras, possibly none.
+    pub(crate) cameras: Vec<Camera>,
+    pub(crate) home: HomeView,
+    /// File that keeps the preparation, if the scene has a place for it.
+    pub(crate) file: Option<PathBuf>,
+}
+
+/// Preparation of a scene for strokes.
+#[derive(Clone, Debug)]
+pub struct PreparedScene {
+    hierarchy: Arc<Hierarchy>,
+    /// The scene's Gaussians.
+    cloud: Arc<GaussianCloud>,
+    /// True if it was kept from before.
+    pub(crate) is_kept: bool,
+}
+
+impl PreparedScene {
+    /// Returns whether it was made for these Gaussians.
+    pub(crate) fn is_of(&self, cloud: &Arc<GaussianCloud>) -> bool {
+        Arc::ptr_eq(&self.cloud, cloud)
+    }
 }
 
 /// A step of a selection.
@@ -40,81 +82,127 @@ pub enum SelectStep {
 pub struct SelectRequest {
     pub(crate) cloud: Arc<GaussianCloud>,
     pub(crate) settings: RenderSettings,
-    /// The photos' cameras, possibly none.
-    pub(crate) cameras: Vec<Camera>,
-    pub(crate) home: HomeView,
     /// Current objects and parts.
     pub(crate) map: Arc<SemanticMap>,
     pub(crate) purpose: SelectFor,
-    /// Preparations and strokes of earlier steps.
+    /// Preparation for these Gaussians; a stroke needs it.
+    pub(crate) prepared: Option<Arc<PreparedScene>>,
+    /// The selection so far.
     pub(crate) before: Option<Arc<Selected>>,
     pub(crate) step: SelectStep,
 }
 
-/// Result of clicks and strokes.
+/// A selection: Gaussians that were given or added, and strokes since.
+#[derive(Clone, Debug, Default)]
+struct Marked {
+    from: Arc<Vec<usize>>,
+    marks: StrokeMarks,
+}
+
+/// Result of the steps of a selection.
 #[derive(Clone, Debug)]
 pub struct Selected {
-    hierarchy: Arc<Hierarchy>,
-    /// The selected scene's Gaussians.
-    cloud: Arc<GaussianCloud>,
-    marks: StrokeMarks,
+    now: Marked,
+    /// Selections before each step other than a stroke.
+    earlier: Vec<Marked>,
+    /// Number of the scene's Gaussians.
+    of: usize,
+    /// Neighbors of the Gaussians, once it has grown or shrunk.
+    neighbors: Option<Arc<SplatNeighbors>>,
     /// Indices of the selected Gaussians, ascending.
     pub(crate) gaussians: Vec<u32>,
     /// Objects and parts with the selection, and its identity among them; `NO_IDENTITY` if nothing is selected.
     pub(crate) preview: Arc<SemanticMap>,
     pub(crate) id: IdentityId,
-    /// Milliseconds from the stroke to the Gaussians, once all is prepared.
+    /// Milliseconds that the step took.
     pub(crate) ms: f64,
 }
 
 impl Selected {
-    /// Number of strokes so far.
-    pub(crate) fn strokes(&self) -> usize {
-        self.marks.len()
-    }
-
-    /// Returns an empty selection with all preparations.
-    pub(crate) fn begun_anew(&self) -> Self {
-        Self { marks: StrokeMarks::default(), gaussians: Vec::new(), id: NO_IDENTITY, ..self.clone() }
-    }
-
-    /// Returns whether it was prepared for these Gaussians.
-    pub(crate) fn is_of(&self, cloud: &Arc<GaussianCloud>) -> bool {
-        Arc::ptr_eq(&self.cloud, cloud)
-    }
-
-    /// Returns whether both share one preparation.
-    pub(crate) fn shares(&self, other: &Self) -> bool {
-        Arc::ptr_eq(&self.hierarchy, &other.hierarchy)
+    /// Number of steps so far.
+    pub(crate) fn steps(&self) -> usize {
+        self.now.marks.len() + self.earlier.iter().map(|m| m.marks.len() + 1).sum::<usize>()
     }
 }
 
-/// Adds the stroke, or undoes the last one.
-pub(crate) fn run(request: &SelectRequest, observer: &mut dyn Observer) -> Result<Selected, JobError> {
-    let SelectRequest { cloud, settings, map, purpose, before, step, .. } = request;
-    // If the Gaussians have changed meanwhile, their hierarchy is built anew.
-    let hierarchy = match before.as_ref().filter(|before| before.is_of(cloud)) {
-        Some(before) => Arc::clone(&before.hierarchy),
-        None => Arc::new(Hierarchy::new(cloud, &views(&request.cameras, &request.home), settings, observer)?),
-    };
-    let start = Instant::now();
-    // Strokes refer to Gaussians by number.
-    let before = before.as_ref().filter(|before| before.hierarchy.gaussians() == cloud.len());
-    let mut marks = before.map(|b| b.marks.clone()).unwrap_or_default();
-    match step {
-        SelectStep::Prepare => {
-            let (cloud, preview) = (Arc::clone(cloud), Arc::clone(map));
-            return Ok(Selected { hierarchy, cloud, marks, gaussians: Vec::new(), preview, id: NO_IDENTITY, ms: 0.0 });
+/// Prepares a scene for strokes, once: the result is kept in its file.
+pub(crate) fn prepare(request: &PrepareRequest, observer: &mut dyn Observer) -> Result<PreparedScene, JobError> {
+    let PrepareRequest { cloud, settings, cameras, home, file } = request;
+    let views = views(cameras, home);
+    let of = stored::digest(cloud, &views, settings);
+    let kept = file.as_ref().and_then(|file| files::read(file, MAX_KEPT_BYTES).ok());
+    let kept = kept.and_then(|bytes| Hierarchy::decode(&bytes, &of, cloud.len()));
+    let is_kept = kept.is_some();
+    let hierarchy = match kept {
+        Some(kept) => kept,
+        None => {
+            let made = Hierarchy::new(cloud, &views, settings, observer)?;
+            if let Some((file, bytes)) = file.as_ref().zip(made.encode(&of))
+                && let Err(e) = export::make_parent(file).map_err(JobError::from).and_then(|()| keep(file, &bytes))
+            {
+                observer.note(Severity::Warning, format!("the preparation is not kept for the next time: {e}"));
+            }
+            made
         }
-        SelectStep::Stroke(stroke) => marks.add(&mut Renderer::new(), cloud, settings, stroke)?,
-        SelectStep::TakeBack => marks.remove_last(),
-    }
-    let from = match purpose {
-        SelectFor::Extent(id) => map.members(*id).into_iter().filter(|i| *i < cloud.len()).collect(),
-        SelectFor::New(_) => Vec::new(),
     };
-    let selected = hierarchy.select(&marks, &from);
-    let gaussians: Vec<u32> = (0..cloud.len() as u32).filter(|i| selected[*i as usize]).collect();
+    Ok(PreparedScene { hierarchy: Arc::new(hierarchy), cloud: Arc::clone(cloud), is_kept })
+}
+
+fn keep(file: &Path, bytes: &[u8]) -> Result<(), JobError> {
+    Ok(atomic::write(file, |w| w.write_all(bytes))?)
+}
+
+/// Carries out a step of a selection.
+pub(crate) fn run(request: &SelectRequest, observer: &mut dyn Observer) -> Result<Selected, JobError> {
+    let SelectRequest { cloud, settings, map, purpose, prepared, before, step } = request;
+    let start = Instant::now();
+    // Steps refer to Gaussians by number.
+    let (mut now, mut earlier, mut neighbors) = match before.as_ref().filter(|before| before.of == cloud.len()) {
+        Some(before) => (before.now.clone(), before.earlier.clone(), before.neighbors.clone()),
+        None => (Marked { from: Arc::new(extent(map, purpose, cloud)), ..Marked::default() }, Vec::new(), None),
+    };
+    let hierarchy = prepared.as_ref().filter(|p| p.is_of(cloud)).map(|p| &*p.hierarchy);
+    let selected = |now: &Marked| -> Vec<bool> {
+        match hierarchy.filter(|_| now.marks.len() > 0) {
+            Some(hierarchy) => hierarchy.select(&now.marks, &now.from),
+            None => mask(cloud.len(), &now.from),
+        }
+    };
+    let change = match step {
+        SelectStep::Stroke(stroke) => {
+            now.marks.add(&mut Renderer::new(), cloud, settings, stroke)?;
+            None
+        }
+        SelectStep::TakeBack => {
+            match now.marks.len() {
+                0 => now = earlier.pop().unwrap_or(now),
+                _ => now.marks.remove_last(),
+            }
+            None
+        }
+        SelectStep::Add(these) | SelectStep::Remove(these) => {
+            let mut of = selected(&now);
+            let is_in = matches!(step, SelectStep::Add(_));
+            these.iter().for_each(|i| of.get_mut(*i as usize).into_iter().for_each(|of| *of = is_in));
+            Some(of)
+        }
+        SelectStep::Grow | SelectStep::Shrink => {
+            let near = match neighbors.take() {
+                Some(near) => near,
+                None => Arc::new(SplatNeighbors::new(cloud, observer)?),
+            };
+            let of = selected(&now);
+            let of = if matches!(step, SelectStep::Grow) { near.grown(&of) } else { near.shrunk(&of) };
+            neighbors = Some(near);
+            Some(of)
+        }
+    };
+    if let Some(of) = change {
+        earlier.push(now);
+        now = Marked { from: Arc::new((0..of.len()).filter(|i| of[*i]).collect()), ..Marked::default() };
+    }
+    let of = selected(&now);
+    let gaussians: Vec<u32> = (0..cloud.len() as u32).filter(|i| of[*i as usize]).collect();
     let ms = ms_since(start);
     let (preview, id) = if gaussians.is_empty() {
         (Arc::clone(map), NO_IDENTITY)
@@ -126,7 +214,22 @@ pub(crate) fn run(request: &SelectRequest, observer: &mut dyn Observer) -> Resul
         };
         (Arc::new(preview), id)
     };
-    Ok(Selected { hierarchy, cloud: Arc::clone(cloud), marks, gaussians, preview, id, ms })
+    Ok(Selected { now, earlier, of: cloud.len(), neighbors, gaussians, preview, id, ms })
+}
+
+/// Returns the Gaussians with which a selection begins, indices.
+fn extent(map: &SemanticMap, purpose: &SelectFor, cloud: &GaussianCloud) -> Vec<usize> {
+    match purpose {
+        SelectFor::Extent(id) => map.members(*id).into_iter().filter(|i| *i < cloud.len()).collect(),
+        SelectFor::New(_) => Vec::new(),
+    }
+}
+
+/// Returns a mask of `n` with the Gaussians `of`.
+fn mask(n: usize, of: &[usize]) -> Vec<bool> {
+    let mut mask = vec![false; n];
+    of.iter().for_each(|i| mask[*i] = true);
+    mask
 }
 
 /// Returns the edit that stores the selection.

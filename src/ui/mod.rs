@@ -29,6 +29,7 @@ pub(crate) mod layout;
 pub(crate) mod object_menu;
 pub(crate) mod palette;
 pub(crate) mod panes;
+pub mod select_shape;
 pub(crate) mod state;
 mod text_field;
 pub(crate) mod theme;

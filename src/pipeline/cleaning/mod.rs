@@ -3,14 +3,14 @@
 //! Nothing is deleted here: measures become selections ([`CleanRule`]), which the user reviews before they are applied.
 
 mod floaters;
+pub(crate) mod neighbors;
 mod pieces;
 mod rules;
 mod support;
 
 use rayon::prelude::*;
-use rstar::RTree;
-use rstar::primitives::GeomWithData;
 
+use self::neighbors::SplatNeighbors;
 pub(crate) use self::rules::{CleanRule, RuleError};
 use crate::io::{self, IoError};
 use crate::math::Real;
@@ -19,14 +19,8 @@ use crate::pipeline::observer::{Interrupted, Observer, Ticker};
 use crate::render::{RenderError, RenderSettings};
 use crate::scene::{Bounds, Camera, GaussianCloud, Photo, PhotoPixels};
 
-/// Nearest neighbors of each Gaussian.
-const NEIGHBORS: usize = 8;
-/// Placeholder for a missing neighbor.
-const NONE: u32 = u32::MAX;
 /// Rank of the neighbor whose distance measures the isolation of a Gaussian.
 const LONELY: usize = 4;
-/// Gaussians in the neighbor search between two progress reports.
-const BLOCK: usize = 1 << 14;
 /// Side of the pictures in which support is measured, px.
 const SIDE_PX: u32 = 320;
 
@@ -126,8 +120,7 @@ pub(crate) struct CloudMeasures {
     floaters: Vec<bool>,
     /// View-independent colors, 0 to 1 as displayed.
     colors: Vec<[f32; 3]>,
-    /// Nearest neighbors; `NONE` for missing ones.
-    near: Vec<[u32; NEIGHBORS]>,
+    near: SplatNeighbors,
     /// Half the diagonal of the scene without stray Gaussians, scene units.
     radius: f64,
 }
@@ -139,31 +132,14 @@ impl CloudMeasures {
             of.iter().zip(gone).filter(|(_, gone)| !**gone).map(|(v, _)| *v).collect()
         }
         let values = self.values.iter().map(|(measure, values)| (*measure, left(values, gone))).collect();
-        let mut number = Vec::with_capacity(gone.len());
-        let mut next = 0;
-        for gone in gone {
-            number.push(if *gone { NONE } else { next });
-            next += u32::from(!gone);
-        }
-        let renumbered = |near: [u32; NEIGHBORS]| near.map(|j| number.get(j as usize).copied().unwrap_or(NONE));
-        let near = left(&self.near, gone).into_iter().map(renumbered).collect();
+        let near = self.near.without(gone);
         let (floaters, colors) = (left(&self.floaters, gone), left(&self.colors, gone));
         Self { values, floaters, colors, near, radius: self.radius }
     }
 
-    /// Adds all neighbors of the selected Gaussians to a selection.
-    pub(crate) fn grown(&self, chosen: &[bool]) -> Vec<bool> {
-        let mut grown = chosen.to_vec();
-        for near in self.near.iter().zip(chosen).filter(|(_, chosen)| **chosen).map(|(near, _)| near) {
-            near.iter().filter(|j| **j != NONE).for_each(|j| grown[*j as usize] = true);
-        }
-        grown
-    }
-
-    /// Removes Gaussians with an unselected neighbor from a selection.
-    pub(crate) fn shrunk(&self, chosen: &[bool]) -> Vec<bool> {
-        let is_inner = |near: &[u32; NEIGHBORS]| near.iter().all(|j| *j == NONE || chosen[*j as usize]);
-        self.near.iter().zip(chosen).map(|(near, chosen)| *chosen && is_inner(near)).collect()
+    /// Nearest neighbors of each Gaussian.
+    pub(crate) fn neighbors(&self) -> &SplatNeighbors {
+        &self.near
     }
 
     /// Values of a measure, `[n]`; `None` without the photos that it needs.
@@ -183,7 +159,7 @@ pub(crate) fn measure(
     observer: &mut dyn Observer,
 ) -> Result<CloudMeasures, CleanError> {
     let radius = Bounds::robust((0..cloud.len()).map(|i| cloud.world_position(i))).map_or(0.0, |b| b.radius());
-    let neighbors = neighbors(cloud, observer)?;
+    let neighbors = neighbors::search(cloud, observer)?;
     let sd = |i: usize| {
         let mut sd = cloud.log_scales[i].map(f32::exp);
         sd.sort_by(|a, b| b.total_cmp(a));
@@ -214,32 +190,13 @@ pub(crate) fn measure(
         values.extend(support.error.map(|error| (SplatMeasure::Error, error)));
     }
     values.push((SplatMeasure::Size, sizes));
-    let first = |of: &Vec<(u32, f32)>| std::array::from_fn(|k| of.get(k).map_or(NONE, |n| n.0));
-    let near = neighbors.iter().map(first).collect();
+    let near = SplatNeighbors::nearest(&neighbors);
     Ok(CloudMeasures { values, floaters, colors: colors(cloud), near, radius })
 }
 
 /// View-independent colors, 0 to 1 as displayed.
 fn colors(cloud: &GaussianCloud) -> Vec<[f32; 3]> {
     (0..cloud.len()).map(|i| cloud.mean_color(i)).collect()
-}
-
-/// Finds the nearest neighbors of each Gaussian with their distances, the nearest first.
-fn neighbors(cloud: &GaussianCloud, observer: &mut dyn Observer) -> Result<Vec<Vec<(u32, f32)>>, Interrupted> {
-    let place = |i: usize| cloud.positions[i].map(f64::from);
-    let tree = RTree::bulk_load((0..cloud.len()).map(|i| GeomWithData::new(place(i), i as u32)).collect());
-    let of = |i: usize| {
-        let near = tree.nearest_neighbor_iter_with_distance_2(place(i)).filter(|(n, _)| n.data != i as u32);
-        near.take(NEIGHBORS).map(|(n, d)| (n.data, d.sqrt() as f32)).collect()
-    };
-    let mut ticker = Ticker::new("Looking for neighbors", cloud.len());
-    let mut all = Vec::with_capacity(cloud.len());
-    for from in (0..cloud.len()).step_by(BLOCK) {
-        ticker.tick(from, observer)?;
-        let to = (from + BLOCK).min(cloud.len());
-        all.par_extend((from..to).into_par_iter().map(of));
-    }
-    Ok(all)
 }
 
 #[cfg(test)]

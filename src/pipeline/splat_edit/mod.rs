@@ -2,7 +2,11 @@
 //!
 //! An edit returns new Gaussians and leaves the old ones unchanged, so that it can be undone.
 
+mod grade;
+
 use glam::{DMat3, DQuat, DVec3};
+
+pub(crate) use self::grade::Grade;
 
 use crate::math::sh::{self, SH_C0};
 use crate::math::{Real, rotation};
@@ -35,12 +39,14 @@ pub struct Arrangement {
     pub(crate) to: Placement,
     /// New color (red, green, blue, 0 to 1, as displayed), which keeps its shades.
     pub(crate) color: Option<[f32; 3]>,
+    /// Change of its colors, after the new color.
+    pub(crate) grade: Grade,
 }
 
 impl Arrangement {
     /// Edit that changes nothing.
     pub(crate) fn of(id: IdentityId) -> Self {
-        Self { id, duplicate: false, to: Placement::default(), color: None }
+        Self { id, duplicate: false, to: Placement::default(), color: None, grade: Grade::default() }
     }
 }
 
@@ -88,6 +94,8 @@ pub enum SplatEditError {
     SamePlace,
     #[error("a scale must be more than 0, and all numbers finite")]
     Placement,
+    #[error("brightness and saturation must be 0 or more and finite, and a tint must not be black")]
+    Grade,
     #[error("'{0}' would be too far away or too large for the numbers that a scene is stored in")]
     OutOfRange(String),
 }
@@ -105,11 +113,13 @@ pub(crate) fn apply(
 ) -> Result<(GaussianCloud, Option<SemanticMap>)> {
     match edit {
         SplatEdit::Delete(gone) => delete(cloud, map, gone),
-        SplatEdit::Arrange(Arrangement { id, duplicate, to, color }) => {
+        SplatEdit::Arrange(Arrangement { id, duplicate, to, color, grade }) => {
+            let matrix = grade.matrix().ok_or(SplatEditError::Grade)?;
+            let is_recolored = color.is_some() || *grade != Grade::default();
             let (map, mut thing) = thing(map, *id)?;
-            match (to.is_nothing(), duplicate, color) {
-                (true, false, None) => return Err(SplatEditError::NoChange),
-                (true, true, None) => return Err(SplatEditError::SamePlace),
+            match (to.is_nothing(), duplicate, is_recolored) {
+                (true, false, false) => return Err(SplatEditError::NoChange),
+                (true, true, false) => return Err(SplatEditError::SamePlace),
                 _ => {}
             }
             let (mut cloud, mut map) = (cloud.clone(), map.clone());
@@ -124,7 +134,10 @@ pub(crate) fn apply(
             if let Some(color) = color {
                 recolor(&mut cloud, &thing, color.map(f64::from));
             }
-            if *duplicate || color.is_some() {
+            if *grade != Grade::default() {
+                grade::apply(&mut cloud, &thing, &matrix);
+            }
+            if *duplicate || is_recolored {
                 map.look_at(&cloud);
             }
             Ok((cloud, Some(map)))

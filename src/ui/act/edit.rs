@@ -10,12 +10,13 @@ use crate::jobs::select::SelectFor;
 use crate::math::format;
 use crate::pipeline::observer::Observer;
 use crate::pipeline::semantics::lifting::edit::Edit;
-use crate::scene::IdentityId;
+use crate::scene::{IdentityId, NO_IDENTITY};
 use crate::ui::actions::Pane;
 use crate::ui::app::App;
 use crate::ui::history::EditStep;
+use crate::ui::select_shape::SelectShape;
 use crate::ui::state::Tone;
-use crate::ui::viewport::tools::Tool;
+
 use crate::worker::JobInfo;
 
 /// Corrects objects and parts.
@@ -25,12 +26,12 @@ pub(in crate::ui) fn apply(app: &mut App, edit: Edit) {
 
 /// Begins selecting a new object or a part of one; `None` ends the tool.
 pub(in crate::ui) fn segment(app: &mut App, of: Option<IdentityId>) {
-    app.viewport.segment(of.map(SelectFor::New), &app.state);
+    app.viewport.select(of.map(SelectFor::New), &app.state);
 }
 
 /// Begins correcting the extent of an identity.
 pub(in crate::ui) fn correct(app: &mut App, id: IdentityId) {
-    app.viewport.segment(Some(SelectFor::Extent(id)), &app.state);
+    app.viewport.select(Some(SelectFor::Extent(id)), &app.state);
 }
 
 /// Adds or corrects what is selected.
@@ -73,21 +74,23 @@ pub(in crate::ui) fn measure_splats(app: &mut App) {
     });
 }
 
-/// Begins choosing Gaussians with a tool, if they are measured.
-pub(in crate::ui) fn choose_with(app: &mut App, tool: Tool) {
-    if app.clean.is_measured() {
-        return app.viewport.choose_with(tool, &app.state);
-    }
-    app.layout.show(Pane::Clean);
-    app.state.toast(Tone::Info, "Measure the Gaussians first (Clean pane): a choice is made among them.");
+/// Goes on by hand with the selection of the Clean pane.
+pub(in crate::ui) fn refine_chosen(app: &mut App) {
+    let first = app.clean.chosen().unwrap_or_default();
+    app.viewport.select_from(SelectFor::New(NO_IDENTITY), Some(SelectShape::Brush), first, &app.state);
 }
 
-/// Deletes the chosen Gaussians.
+/// Deletes the selected Gaussians: those of the tool, else those of the Clean pane.
 pub(in crate::ui) fn delete_chosen(app: &mut App) {
-    match app.clean.take_chosen() {
-        Some(gone) => edits::queue(app, EditStep::Rearrange(SplatEdit::Delete(gone))),
-        None => app.state.toast(Tone::Info, "No Gaussians are chosen: measure them in the Clean pane."),
-    }
+    let selected = app.viewport.selected_gaussians().map(<[u32]>::to_vec).or_else(|| app.clean.chosen());
+    let Some((selected, cloud)) = selected.zip(app.viewport.cloud()) else {
+        return app.state.toast(Tone::Info, "No Gaussians are selected: select some in the view or in the Clean pane.");
+    };
+    let mut gone = vec![false; cloud.len()];
+    selected.iter().for_each(|i| gone.get_mut(*i as usize).into_iter().for_each(|gone| *gone = true));
+    app.viewport.select(None, &app.state);
+    app.clean.deletes(&gone);
+    edits::queue(app, EditStep::Rearrange(SplatEdit::Delete(gone)));
 }
 
 /// Turns the name of the selected identity into a text field.

@@ -72,6 +72,16 @@ pub(in crate::ui) fn identity(app: &mut App, id: IdentityId) {
     });
 }
 
+/// Exports the Gaussians that the tool selects.
+pub(in crate::ui) fn selection(app: &mut App) {
+    let selected = app.viewport.selected_gaussians().map(|of| of.iter().map(|i| *i as usize).collect::<Vec<_>>());
+    let Some((selected, cloud)) = selected.zip(app.viewport.cloud()) else {
+        return app.state.toast(Tone::Info, "No Gaussians are selected: choose 'Select Gaussians by…' first.");
+    };
+    let (of, name) = (Arc::new(cloud.select(&selected)), format!("{}-selection", scene_name(app)));
+    gaussians(app, &name, |_| Some(of));
+}
+
 /// Exports the Gaussians that the crop box keeps.
 pub(in crate::ui) fn crop(app: &mut App) {
     if !has_view(app) {

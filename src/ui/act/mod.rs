@@ -17,7 +17,6 @@ use super::actions::{Action, action_table};
 use super::app::App;
 use super::history::EditStep;
 use super::viewport::overrides::RenderOverrides;
-use super::viewport::tools::Tool;
 use crate::jobs::train::IfChanged;
 
 macro_rules! define_act {

@@ -13,7 +13,7 @@ use crate::navigate::FRAMES;
 use crate::navigate::target::{Side, ViewPreference};
 use crate::pipeline::observer::Observer;
 use crate::scene::{CropBox, Identities, IdentityId, NO_IDENTITY, SemanticMap};
-use crate::ui::actions::Pane;
+use crate::ui::actions::{Face, Pane};
 use crate::ui::app::App;
 use crate::ui::color_by::ColorBy;
 use crate::ui::context::SceneContext;
@@ -31,6 +31,14 @@ pub(in crate::ui) fn frame(app: &mut App, ctx: &Context) {
 
 pub(in crate::ui) fn reset(app: &mut App, ctx: &Context) {
     app.viewport.reset_view(&app.state, now(ctx));
+}
+
+pub(in crate::ui) fn look_from(app: &mut App, ctx: &Context, face: Face) {
+    app.viewport.look_from(face, &app.state, now(ctx));
+}
+
+pub(in crate::ui) fn toggle_orthographic(app: &mut App, ctx: &Context) {
+    app.viewport.toggle_orthographic(now(ctx));
 }
 
 pub(in crate::ui) fn turn_up(app: &mut App, ctx: &Context, up: DVec3) {

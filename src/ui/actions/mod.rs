@@ -14,6 +14,7 @@ use crate::navigate::target::Side;
 use crate::pipeline::semantics::lifting::edit::Edit;
 use crate::scene::{CropBox, IdentityId, NO_IDENTITY};
 use crate::ui::color_by::ColorBy;
+use crate::ui::select_shape::SelectShape;
 use crate::worker::{Start, ViewMode};
 
 /// A pane of the window that can be hidden, in the order of the menu.
@@ -53,6 +54,19 @@ impl Pane {
     pub(crate) fn text(self) -> &'static str {
         self.into()
     }
+}
+
+/// Side of the scene.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, VariantArray, IntoStaticStr)]
+#[strum(serialize_all = "lowercase")]
+#[allow(missing_docs, reason = "each name says which side it is")]
+pub enum Face {
+    Front,
+    Back,
+    Left,
+    Right,
+    Top,
+    Bottom,
 }
 
 /// A world direction that can be up.
@@ -152,11 +166,13 @@ impl Action {
     pub(crate) fn all() -> Vec<Self> {
         let mut all = Self::plain();
         // These need a tool in use.
-        all.retain(|a| !matches!(a, Self::AddPainted | Self::ApplyTransform | Self::DeleteChosen));
+        all.retain(|a| !matches!(a, Self::AddPainted | Self::ApplyTransform));
         all.extend([Self::Isolate(None), Self::SegmentNew(Some(NO_IDENTITY)), Self::SetCrop(None)]);
         all.extend(ViewMode::VARIANTS.iter().map(|mode| Self::Show(*mode)));
         all.extend(Pane::VARIANTS.iter().map(|pane| Self::ShowPane(*pane)));
         all.extend(THEMES.map(Self::UseTheme));
+        all.extend(Face::VARIANTS.iter().map(|face| Self::LookFrom(*face)));
+        all.extend(SelectShape::VARIANTS.iter().map(|shape| Self::SelectBy(*shape)));
         all.extend(ColorBy::VARIANTS.iter().map(|by| Self::Tint(*by)));
         all.extend(Pane::VARIANTS.iter().map(|pane| Self::TogglePane(*pane)));
         all.extend(Axis::VARIANTS.iter().map(|axis| Self::TurnUp(*axis)));

@@ -132,13 +132,16 @@ macro_rules! action_table {
             MeasureSplats: "Clean up\u{2026}",
                 "Size, shape, opacity and neighbors of each, and what the photos show of it: finds floaters and the like."
                 => edit::measure_splats(app);
-            BrushSplats: "Choose Gaussians by brush", "Brush over what is chosen in the Clean pane, once it is measured."
-                => edit::choose_with(app, Tool::SplatBrush(Default::default()));
-            PickColor: "Choose Gaussians by color", "Click a color in the view: adds its Gaussians to the choice in the Clean pane."
-                => edit::choose_with(app, Tool::Eyedropper(Default::default()));
-            DeleteChosen: "Delete the chosen Gaussians",
-                "Delete what is chosen in the Clean pane; can be undone, and the scene that was opened stays as it is."
+            SelectBy(shape: SelectShape): format!("Select Gaussians by {shape}"),
+                "In any view; to keep them as an object or part, to delete or to export them."
+                => app.viewport.select_with(shape, &app.state);
+            RefineChosen: "Go on selecting by hand", "Brush, lasso and more, from the selection of the Clean pane on."
+                => edit::refine_chosen(app);
+            DeleteChosen: "Delete the selected Gaussians",
+                "Those that are outlined, or selected in the Clean pane; can be undone, and the scene that was opened stays as it is."
                 => edit::delete_chosen(app);
+            ExportSelection: "Export the selected Gaussians\u{2026}", "Write the selection in the format that 3DGS viewers read."
+                => export::selection(app);
             ExportCrop: "Export what the crop box keeps\u{2026}",
                 "Write the Gaussians whose centers it keeps, hidden ones too, in the format that 3DGS viewers read."
                 => export::crop(app);
@@ -170,6 +173,11 @@ macro_rules! action_table {
             FrameScene: "Frame the selection or the scene", "Move until the selection, or the whole scene, fits the view.", "F"
                 => view::frame(app, ctx);
             ResetView: "Reset the view", "Return to the scene's initial view.", "Home" => view::reset(app, ctx);
+            LookFrom(face: Face): format!("Look from the {}", <&str>::from(face)),
+                "Straight and without perspective, at the selection or the whole scene."
+                => view::look_from(app, ctx, face);
+            Orthographic: "Orthographic view", "Parallel lines stay parallel: to compare sizes and to measure. Again for perspective.", "Y"
+                => view::toggle_orthographic(app, ctx);
             TurnUp(axis: Axis): format!("Make {} the up direction", axis.text()), "For scenes that lie on their side."
                 => view::turn_up(app, ctx, axis.vector());
             SetUp(up: DVec3): format!("Make ({:.2}, {:.2}, {:.2}) the up direction", up.x, up.y, up.z),

@@ -21,8 +21,7 @@ pub(super) fn panes(app: &mut App, ui: &mut Ui) {
     let bar = Frame::new().fill(theme::panel()).inner_margin(Margin::symmetric(10, 6));
     if !fills_window(app) {
         let (mut cx, viewport) = app.context();
-        let second = viewport.queries.is_second();
-        Panel::top("menus").frame(bar).show(ui, |ui| bars::top(ui, &mut cx, second));
+        Panel::top("menus").frame(bar).show(ui, |ui| bars::top(ui, &mut cx, viewport));
         Panel::bottom("status").frame(bar).show(ui, |ui| bars::status(ui, &mut cx, viewport.picture()));
     }
     problems::show(ui, &mut app.state);

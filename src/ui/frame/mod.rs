@@ -60,13 +60,10 @@ fn take_news(app: &mut App, ctx: &egui::Context) {
         app.layout.dock.activate(news);
     }
     app.viewport.update(&mut app.state, &app.tasks);
-    let brushed = app.viewport.take_brushed();
     let cloud = app.viewport.cloud().map(|cloud| &**cloud);
-    let chosen = app.clean.update(&app.state, cloud, brushed, app.layout.shows(Pane::Clean));
-    app.viewport.visibility.set_chosen(chosen);
-    if !app.clean.is_measured() {
-        app.viewport.end_choosing();
-    }
+    let chosen = app.clean.update(cloud, app.layout.shows(Pane::Clean));
+    let marked = if app.viewport.is_selecting() { app.viewport.marked() } else { chosen };
+    app.viewport.visibility.set_chosen(marked);
     app.camera.on_scene(app.state.scene_number);
     for effect in app.chat.news() {
         edits::settle(app, false);

@@ -7,12 +7,14 @@ use strum::VariantArray;
 
 use super::super::ctx::Ctx;
 use super::super::state::RunningJob;
+use super::super::viewport::Viewport;
 use super::super::{keys, theme};
 use crate::math::format;
 use crate::pipeline::observer::Progress;
 use crate::remote::LinkStatus;
-use crate::scene::text;
-use crate::ui::actions::{Action, Axis, Pane, THEMES};
+use crate::scene::{NO_IDENTITY, text};
+use crate::ui::actions::{Action, Axis, Face, Pane, THEMES};
+use crate::ui::select_shape::SelectShape;
 use crate::worker::ViewMode;
 use crate::worker::view::ViewPicture;
 
@@ -22,9 +24,9 @@ const INDENT: &str = "     ";
 /// Width of the pause and resume button, points.
 const PAUSE_PT: f32 = 62.0;
 
-/// Draws the bar at the top; `second` is true if the second view is active.
-pub(crate) fn top(ui: &mut Ui, cx: &mut Ctx<'_>, second: bool) {
-    let state = cx.state;
+/// Draws the bar at the top.
+pub(crate) fn top(ui: &mut Ui, cx: &mut Ctx<'_>, view: &Viewport) {
+    let (state, second) = (cx.state, view.queries.is_second());
     ui.horizontal(|ui| {
         let has_scene = state.scene.is_some();
         let has_photos = state.scene.as_ref().is_some_and(|s| s.dataset.is_some());
@@ -95,6 +97,12 @@ pub(crate) fn top(ui: &mut Ui, cx: &mut Ctx<'_>, second: bool) {
             for action in [Action::FrameScene, Action::ResetView] {
                 item(ui, has_scene, Some(false), action, cx);
             }
+            item(ui, has_scene, Some(view.is_orthographic()), Action::Orthographic, cx);
+            ui.menu_button(format!("{INDENT}Look from"), |ui| {
+                for &face in Face::VARIANTS {
+                    item(ui, has_scene, Some(false), Action::LookFrom(face), cx);
+                }
+            });
             ui.menu_button(format!("{INDENT}Up direction"), |ui| {
                 for &axis in Axis::VARIANTS {
                     item(ui, has_scene, Some(false), Action::TurnUp(axis), cx);
@@ -124,9 +132,14 @@ pub(crate) fn top(ui: &mut Ui, cx: &mut Ctx<'_>, second: bool) {
         });
         ui.menu_button("Tools", |ui| {
             ui.set_min_width(220.0);
-            for action in [Action::Measure, Action::Crop, Action::Inspect] {
+            for action in [Action::Measure, Action::Crop, Action::Inspect, Action::SegmentNew(Some(NO_IDENTITY))] {
                 item(ui, has_scene, None, action, cx);
             }
+            ui.menu_button("Select Gaussians", |ui| {
+                for shape in SelectShape::VARIANTS {
+                    item(ui, has_scene, None, Action::SelectBy(*shape), cx);
+                }
+            });
             item(ui, state.is_trained() && state.job.is_none(), None, Action::MeasureSplats, cx);
         });
         ui.menu_button("Train", |ui| {

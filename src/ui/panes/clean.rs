@@ -12,7 +12,6 @@ use super::super::state::AppState;
 use super::super::theme;
 use super::super::viewport::Viewport;
 use super::super::viewport::splat_selection::SplatSelection;
-use super::super::viewport::tools::splat_brush::Brushed;
 use super::PaneContents;
 use super::histogram::Histogram;
 use crate::jobs::clean::{self, CleanRule, CloudMeasures, MeasuredCloud, SplatMeasure};
@@ -50,21 +49,13 @@ struct SplatChoice {
     /// The crop box, if the Gaussians outside are chosen; the selected identity, if its Gaussians are.
     crop: Option<CropBox>,
     object: Option<IdentityId>,
-    /// Gaussians that a brush has chosen (`true`) or removed from the choice, before all rules; may be empty.
-    brushed: Arc<Vec<Option<bool>>>,
     /// True if chosen Gaussians are hidden in the view; else they are marked.
     hide: bool,
 }
 
 impl CleanPane {
     /// Follows the cloud on screen. Returns the choice for the view.
-    pub(crate) fn update(
-        &mut self,
-        state: &AppState,
-        cloud: Option<&Arc<GaussianCloud>>,
-        brushed: Vec<Brushed>,
-        is_shown: bool,
-    ) -> Option<Arc<SplatSelection>> {
+    pub(crate) fn update(&mut self, cloud: Option<&Arc<GaussianCloud>>, is_shown: bool) -> Option<Arc<SplatSelection>> {
         let is_of = |m: &Arc<MeasuredCloud>| cloud.is_some_and(|c| Arc::ptr_eq(c, &m.cloud));
         if let (Some(measured), Some(cloud)) = (self.measured.take_if(|m| !is_of(m)), cloud) {
             // The measures of the remaining Gaussians stay valid; pieces and distances are kept as before.
@@ -75,22 +66,18 @@ impl CleanPane {
                 self.take(Arc::new(MeasuredCloud { cloud: Arc::clone(cloud), measures }));
             }
         }
-        if let Some(measured) = self.measured.clone().filter(|_| !brushed.is_empty()) {
-            brushed.iter().for_each(|brushed| self.choice.brush(brushed, measured.cloud.len()));
-            self.choose(&measured, state);
-        }
         self.chosen.clone().filter(|_| is_shown)
     }
 
-    /// True if Gaussians are measured.
-    pub(crate) fn is_measured(&self) -> bool {
-        self.measured.is_some()
+    /// Indices of the selected Gaussians, if there are any.
+    pub(crate) fn chosen(&self) -> Option<Vec<u32>> {
+        let chosen = self.chosen.as_ref().filter(|c| c.count > 0)?;
+        Some((0..chosen.of.len() as u32).filter(|i| chosen.of[*i as usize]).collect())
     }
 
-    /// Takes the chosen Gaussians, to delete them.
-    pub(crate) fn take_chosen(&mut self) -> Option<Vec<bool>> {
-        self.deleted = self.chosen.clone().filter(|c| c.count > 0);
-        self.deleted.as_ref().map(|c| c.of.clone())
+    /// Notes that these Gaussians will be deleted: the measures of the others stay.
+    pub(crate) fn deletes(&mut self, gone: &[bool]) {
+        self.deleted = Some(Arc::new(SplatSelection::new(gone.to_vec(), false)));
     }
 
     /// Takes over new measures.
@@ -109,7 +96,7 @@ impl CleanPane {
     }
 
     fn show_chosen(&mut self, ui: &mut Ui, measured: &MeasuredCloud, cx: &mut Ctx<'_>) {
-        theme::section(ui, "Chosen");
+        theme::section(ui, "Selected");
         let (count, all) = (self.chosen.as_ref().map_or(0, |c| c.count), measured.cloud.len());
         let share = format::number(100.0 * count as f64 / all.max(1) as f64);
         ui.label(format!("{} of {} Gaussians ({share} %)", format::count(count as u64), format::count(all as u64)));
@@ -122,8 +109,10 @@ impl CleanPane {
                     *chosen = Arc::new(SplatSelection::new(change(&measured.measures, &chosen.of), self.choice.hide));
                 }
             };
-            other(ui, "Grow", "Also choose the neighbors of the chosen Gaussians.", CloudMeasures::grown);
-            other(ui, "Shrink", "Leave out Gaussians with a neighbor that is not chosen.", CloudMeasures::shrunk);
+            other(ui, "Grow", "Take the neighbors of the selected Gaussians, too.", |m, of| m.neighbors().grown(of));
+            other(ui, "Shrink", "Leave out Gaussians with a neighbor that is not selected.", |m, of| {
+                m.neighbors().shrunk(of)
+            });
         });
         ui.horizontal(|ui| {
             let delete = Action::DeleteChosen;
@@ -131,7 +120,11 @@ impl CleanPane {
             if button.on_hover_text(delete.tooltip()).clicked() {
                 cx.ask(delete);
             }
-            if ui.add_enabled(count > 0, Button::new("Choose none")).clicked() {
+            let by_hand = Action::RefineChosen;
+            if ui.button("By hand\u{2026}").on_hover_text(by_hand.tooltip()).clicked() {
+                cx.ask(by_hand);
+            }
+            if ui.add_enabled(count > 0, Button::new("Select none")).clicked() {
                 let SplatChoice { measure, hide, .. } = self.choice;
                 (self.choice, self.chosen) = (SplatChoice { measure, hide, ..SplatChoice::default() }, None);
             }
@@ -204,13 +197,6 @@ impl PaneContents for CleanPane {
         self.show_measure(ui, &measured.measures);
         theme::section(ui, "By color and place");
         self.choice.show_places(ui, view.picking.selected(), view.visibility.crop());
-        ui.horizontal(|ui| {
-            for (text, tool) in [("Brush\u{2026}", Action::BrushSplats), ("Pick a color\u{2026}", Action::PickColor)] {
-                if ui.button(text).on_hover_text(tool.tooltip()).clicked() {
-                    cx.ask(tool);
-                }
-            }
-        });
         if before != self.choice {
             self.choose(&measured, state);
         }
@@ -236,13 +222,6 @@ impl SplatChoice {
                 ui.label(RichText::new(format::count(count as u64)).color(theme::weak()));
             });
         });
-    }
-
-    fn brush(&mut self, brushed: &Brushed, all: usize) {
-        let of = Arc::make_mut(&mut self.brushed);
-        of.resize(all, None);
-        let places = brushed.numbers.iter().filter(|i| **i < all);
-        places.for_each(|i| of[*i] = Some(!brushed.erase));
     }
 
     fn show_places(&mut self, ui: &mut Ui, selected: Option<IdentityId>, crop: Option<CropBox>) {
@@ -277,9 +256,6 @@ impl SplatChoice {
         }
         if let (Some(id), Some(map)) = (self.object, &state.semantics) {
             map.members(id).into_iter().for_each(|i| of.get_mut(i).into_iter().for_each(|of| *of = true));
-        }
-        for (of, brushed) in of.iter_mut().zip(self.brushed.iter()) {
-            *of = brushed.unwrap_or(*of);
         }
         of.contains(&true).then_some(of)
     }

@@ -103,7 +103,7 @@ pub struct AppState {
     pub second_report: Option<ShownReport>,
     /// Status of the connection to the server of the current scene, if it has one.
     pub(crate) link: Option<LinkStatus>,
-    short_jobs: BTreeMap<JobId, JobInfo>,
+    short_jobs: BTreeMap<JobId, RunningJob>,
     next_toast: u64,
 }
 
@@ -119,7 +119,7 @@ impl AppState {
             Event::Started(job, info) => {
                 let info = JobInfo { title: text::line(&info.title).into_owned(), ..info };
                 if info.lane == JobLane::Short {
-                    self.short_jobs.insert(job, info);
+                    self.short_jobs.insert(job, RunningJob::begun(job, info));
                     return;
                 }
                 if info.makes == Makes::Gaussians {
@@ -175,7 +175,7 @@ impl AppState {
                 }
             }
             JobEnd::Failed(failure) => {
-                let info = short.or(long.map(|j| j.info)).unwrap_or_else(|| JobInfo::long("Working"));
+                let info = short.or(long).map(|j| j.info).unwrap_or_else(|| JobInfo::long("Working"));
                 match (failure.is_refusal, info.is_aside) {
                     (true, _) => self.toast(Tone::Warning, failure.message),
                     (false, true) => self.toast(Tone::Warning, format!("{}: {}", info.title, failure.message)),
@@ -244,9 +244,8 @@ impl AppState {
     }
 
     fn with_job(&mut self, job: JobId, change: impl FnOnce(&mut RunningJob)) {
-        if let Some(j) = self.job.as_mut().filter(|j| j.id == job) {
-            change(j);
-        }
+        let long = self.job.as_mut().filter(|j| j.id == job);
+        long.or(self.short_jobs.get_mut(&job)).map(change);
     }
 
     fn evaluated_in_training(&mut self, job: JobId, evaluation: Evaluation) {

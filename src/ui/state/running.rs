@@ -1,5 +1,6 @@
 //! The running job and its remaining time.
 
+use super::AppState;
 use crate::pipeline::observer::Progress;
 use crate::worker::{JobId, JobInfo};
 
@@ -49,6 +50,13 @@ impl RunningJob {
             _ if progress.done >= progress.total => None,
             (now, before) => now.or(before.map(|(_, left)| left)),
         };
+    }
+}
+
+impl AppState {
+    /// The running job with this number, long or short.
+    pub(crate) fn running(&self, job: JobId) -> Option<&RunningJob> {
+        self.job.as_ref().filter(|j| j.id == job).or(self.short_jobs.get(&job))
     }
 }
 

@@ -1,15 +1,17 @@
 //! The user's actions on the view: its camera, its photo and its tool.
 
+use std::sync::Arc;
+
 use glam::{DVec2, DVec3};
 
 use super::eye::Eye;
 use super::photo::PhotoView;
+use super::splat_selection::SplatSelection;
 use super::tools::Tool;
 use super::tools::crop::CropTool;
 use super::tools::mask_brush::MaskBrush;
 use super::tools::ruler::Ruler;
-use super::tools::segment::SegmentTool;
-use super::tools::splat_brush::Brushed;
+use super::tools::select::SelectTool;
 use super::tools::transform::TransformTool;
 use super::visible::VisibleCloud;
 use super::{AppState, Viewport};
@@ -19,7 +21,9 @@ use crate::jobs::rearrange::Arrangement;
 use crate::jobs::select::SelectFor;
 use crate::navigate::Pose;
 use crate::pipeline::semantics::lifting::edit::Edit;
-use crate::scene::{CropBox, IdentityId};
+use crate::scene::{CropBox, IdentityId, NO_IDENTITY};
+use crate::ui::actions::Face;
+use crate::ui::select_shape::SelectShape;
 use crate::worker::Tasks;
 
 /// The camera.
@@ -49,6 +53,30 @@ impl Viewport {
         self.leave_photo();
         self.up = Some(up);
         self.eye.set_up(up);
+        self.moved_at = now;
+    }
+
+    /// True if the view is orthographic.
+    pub fn is_orthographic(&self) -> bool {
+        self.eye.is_orthographic()
+    }
+
+    /// Switches between perspective and orthographic view.
+    pub(crate) fn toggle_orthographic(&mut self, now: f64) {
+        self.leave_photo();
+        self.eye.set_orthographic(!self.eye.is_orthographic());
+        self.moved_at = now;
+    }
+
+    /// Looks straight at the selected identity, or else at the scene, from a side; orthographic until the user ends that.
+    pub(crate) fn look_from(&mut self, face: Face, state: &AppState, now: f64) {
+        let Some(scene) = &state.scene else { return };
+        self.leave_photo();
+        let selected = self.parts().1.selected_bounds(state.semantics.as_ref());
+        let ahead = scene.home.camera.as_ref().map_or(DVec3::Y, |camera| camera.forward());
+        self.eye.look_from(face, ahead);
+        self.eye.set_orthographic(true);
+        self.eye.frame(selected.as_ref().unwrap_or(&scene.home.bounds));
         self.moved_at = now;
     }
 
@@ -151,16 +179,54 @@ impl Viewport {
         inspector.inspect(request, tasks);
     }
 
-    /// Selects by clicks and strokes, for `purpose`; `None` ends painting, selecting and transforming.
-    pub(crate) fn segment(&mut self, purpose: Option<SelectFor>, state: &AppState) {
-        if state.scene.is_none() {
-            return;
-        }
+    /// Selects Gaussians for `purpose`; `None` ends painting, selecting and transforming.
+    pub(crate) fn select(&mut self, purpose: Option<SelectFor>, state: &AppState) {
         match purpose {
             None => drop(self.tool.take_if(|tool| tool.is_edit())),
             // Only known objects and parts can be corrected.
             Some(SelectFor::Extent(_)) if state.semantics.is_none() => self.tool = None,
-            Some(purpose) => self.tool = Some(Tool::Segment(Box::new(SegmentTool::new(purpose)))),
+            Some(purpose) => self.select_from(purpose, None, Vec::new(), state),
+        }
+    }
+
+    /// Selects with a shape, in the selection that there is, or in a new one.
+    pub(crate) fn select_with(&mut self, shape: SelectShape, state: &AppState) {
+        match &mut self.tool {
+            Some(Tool::Select(tool)) => tool.shape = shape,
+            _ => self.select_from(SelectFor::New(NO_IDENTITY), Some(shape), Vec::new(), state),
+        }
+    }
+
+    /// Selects Gaussians for `purpose`, from `first` on. Without a shape, the one used last goes on.
+    pub(crate) fn select_from(
+        &mut self,
+        purpose: SelectFor,
+        shape: Option<SelectShape>,
+        first: Vec<u32>,
+        state: &AppState,
+    ) {
+        if state.scene.is_some() {
+            let shape = shape.or(self.select_tool().map(|tool| tool.shape)).unwrap_or_default();
+            self.tool = Some(Tool::Select(Box::new(SelectTool::new(purpose, shape, first))));
+        }
+    }
+
+    /// Indices of the selected Gaussians, if there are any.
+    pub(crate) fn selected_gaussians(&self) -> Option<&[u32]> {
+        self.select_tool()?.gaussians()
+    }
+
+    /// True if the tool in use selects.
+    pub(crate) fn is_selecting(&self) -> bool {
+        self.select_tool().is_some()
+    }
+
+    /// Selected Gaussians that the view marks.
+    pub(crate) fn marked(&mut self) -> Option<Arc<SplatSelection>> {
+        let n = self.cloud.as_ref()?.len();
+        match &mut self.tool {
+            Some(Tool::Select(tool)) => tool.marked(n),
+            _ => None,
         }
     }
 
@@ -180,21 +246,9 @@ impl Viewport {
         }
     }
 
-    /// Chooses Gaussians with this tool, if they are a result.
-    pub(crate) fn choose_with(&mut self, tool: Tool, state: &AppState) {
-        if state.scene.is_some() {
-            self.tool = Some(tool).filter(|_| state.is_trained());
-        }
-    }
-
-    /// Ends choosing Gaussians, as their measures are gone.
-    pub(crate) fn end_choosing(&mut self) {
-        drop(self.tool.take_if(|tool| matches!(tool, Tool::SplatBrush(_) | Tool::Eyedropper(_))));
-    }
-
     /// Ends selecting; returns the edit that applies the selection, if there is one.
     pub(crate) fn take_edit(&mut self) -> Option<Edit> {
-        let edit = self.segment_tool()?.edit();
+        let edit = self.select_tool()?.edit();
         self.tool = None;
         edit
     }
@@ -207,24 +261,19 @@ impl Viewport {
         Some(arrangement)
     }
 
-    /// Takes the Gaussians chosen by the tool since the last call.
-    pub(crate) fn take_brushed(&mut self) -> Vec<Brushed> {
-        self.tool.as_mut().map(|tool| tool.as_dyn().take_brushed()).unwrap_or_default()
-    }
-
     /// Number of selected Gaussians, once all clicks and strokes are processed.
     pub fn selection(&self) -> Option<usize> {
-        self.segment_tool()?.count()
+        self.select_tool()?.count()
     }
 
     /// Number of drawn lines that are not processed yet.
     pub fn lines_drawn(&self) -> usize {
-        self.segment_tool().map_or(0, SegmentTool::lines_drawn)
+        self.select_tool().map_or(0, SelectTool::lines_drawn)
     }
 
-    pub(super) fn segment_tool(&self) -> Option<&SegmentTool> {
+    pub(super) fn select_tool(&self) -> Option<&SelectTool> {
         match &self.tool {
-            Some(Tool::Segment(tool)) => Some(tool),
+            Some(Tool::Select(tool)) => Some(tool),
             _ => None,
         }
     }

@@ -21,6 +21,8 @@ pub struct Eye {
     pub(crate) up: DVec3,
     /// Vertical field of view in radians.
     pub(crate) fov_y_rad: f64,
+    /// Field of view with perspective, while the view is orthographic.
+    pub(super) perspective_rad: Option<f64>,
 }
 
 impl Eye {
@@ -38,6 +40,7 @@ impl Eye {
             pivot,
             up,
             fov_y_rad: camera.fov_y_rad(),
+            perspective_rad: None,
         }
     }
 
@@ -84,11 +87,16 @@ impl Eye {
 
     /// Moves camera and pivot in the image plane so that points at the pivot's depth follow the cursor.
     pub(crate) fn pan(&mut self, delta_px: DVec2, height_px: f64) {
-        let depth = (self.pivot - self.center).dot(self.forward()).abs().max(0.05 * self.distance());
-        let per_px = 2.0 * depth * (0.5 * self.fov_y_rad).tan() / height_px.max(1.0);
+        let per_px = self.units_per_px(self.pivot, height_px);
         let shift = self.world_from_eye * DVec3::new(-delta_px.x, -delta_px.y, 0.0) * per_px;
         self.center += shift;
         self.pivot += shift;
+    }
+
+    /// Size of a pixel at the depth of a point, in a frame of this height.
+    pub(crate) fn units_per_px(&self, point: DVec3, height_px: f64) -> f64 {
+        let depth = (point - self.center).dot(self.forward()).abs().max(0.05 * self.distance());
+        2.0 * depth * (0.5 * self.fov_y_rad).tan() / height_px.max(1.0)
     }
 
     /// Moves toward `target` so that its distance is multiplied by `factor` (below 1: nearer). The target keeps its
@@ -98,7 +106,10 @@ impl Eye {
     }
 
     /// Flies: `motion` is in camera axes (right, up, forward), in scene units. The pivot moves along.
-    pub(crate) fn fly(&mut self, motion: DVec3) {
+    pub(crate) fn fly(&mut self, mut motion: DVec3) {
+        if self.is_orthographic() {
+            self.fly_orthographic(std::mem::take(&mut motion.z));
+        }
         let shift = self.world_from_eye * DVec3::new(motion.x, -motion.y, motion.z);
         self.center += shift;
         self.pivot += shift;
@@ -137,6 +148,7 @@ impl Eye {
             pivot: pose.center + pose.forward() * distance,
             up,
             fov_y_rad: pose.fov_y_rad,
+            perspective_rad: None,
         };
     }
 
@@ -144,8 +156,12 @@ impl Eye {
     pub(crate) fn point_at_pivot_depth(&self, at: DVec2, aspect: f64) -> DVec3 {
         let camera = self.camera(1000, (1000.0 * aspect).max(1.0) as u32);
         let ray = camera.ray(at * DVec2::new(f64::from(camera.width_px), f64::from(camera.height_px)));
-        let depth = (self.pivot - self.center).dot(self.forward()).abs().max(0.05 * self.distance());
-        self.center + ray * depth
+        self.center + ray * self.pivot_depth()
+    }
+
+    /// Depth of the pivot, never 0.
+    pub(super) fn pivot_depth(&self) -> f64 {
+        (self.pivot - self.center).dot(self.forward()).abs().max(0.05 * self.distance())
     }
 
     /// Sets another up direction and turns upright.

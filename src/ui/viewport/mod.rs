@@ -19,6 +19,7 @@ pub(crate) mod route;
 mod show;
 pub(crate) mod splat_selection;
 mod split;
+mod straight;
 pub(crate) mod tools;
 pub(crate) mod visible;
 
@@ -122,8 +123,6 @@ impl Viewport {
 
     /// Shows other Gaussians of the scene.
     pub(crate) fn set_cloud(&mut self, cloud: Option<Arc<GaussianCloud>>) {
-        // Numbers of the Gaussians before do not apply to these.
-        drop(self.take_brushed());
         self.cloud = cloud.map(Versioned::new);
     }
 
@@ -142,10 +141,11 @@ impl Viewport {
 
     /// Current camera pose.
     pub fn pose(&self) -> Pose {
-        let (center, world_from_camera) = (self.eye.center, self.eye.world_from_eye);
+        let eye = self.eye.in_perspective();
+        let (center, world_from_camera) = (eye.center, eye.world_from_eye);
         let fov_y_rad = match &self.photo {
-            Some(photo) => photo.free_fov(self.eye.fov_y_rad),
-            None => self.eye.fov_y_rad,
+            Some(photo) => photo.free_fov(eye.fov_y_rad),
+            None => eye.fov_y_rad,
         };
         Pose { center, world_from_camera, fov_y_rad }
     }

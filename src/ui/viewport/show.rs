@@ -10,13 +10,14 @@ use super::query::SearchedScene;
 use super::request::Moved;
 use super::route::CameraRoute;
 use super::split::{self, ViewArea, Views};
-use super::tools::segment::SegmentTool;
+use super::tools::select::SelectTool;
 use super::tools::{CardPlaces, Tool};
 use super::visible::VisibleCloud;
 use super::{Viewport, frusta, query, route};
 use crate::pipeline::semantics::query::language::QueryPlace;
 use crate::pipeline::semantics::query::language::viewpoint::Viewpoint;
 use crate::ui::ctx::Ctx;
+use crate::ui::select_shape::SelectShape;
 use crate::worker::ViewMode;
 use crate::worker::view::{QualityBudget, SkipPasses, ViewRequest};
 
@@ -206,9 +207,11 @@ impl Viewport {
             _ => None,
         };
         let (cloud, map) = transformed.unwrap_or_else(|| (cloud, state.semantics.clone()));
-        let preview = self.segment_tool().and_then(SegmentTool::preview).cloned();
+        let preview = self.select_tool().and_then(SelectTool::preview).cloned();
         let VisibleCloud { cloud, semantics, .. } = self.visibility.apply(&cloud, preview.as_ref().or(map.as_ref()));
-        let with_maps = plan.maps.now(self.queries.wanted() || self.picking.wanted()) || preview.is_some();
+        let picks_objects = self.select_tool().is_some_and(|tool| tool.shape == SelectShape::Object);
+        let is_wanted = self.queries.wanted() || self.picking.wanted() || picks_objects;
+        let with_maps = plan.maps.now(is_wanted) || preview.is_some();
         let semantics = semantics.filter(|_| with_maps);
         let rests = now - self.moved_at - REST_SECS;
         if rests < 0.0 {

@@ -16,6 +16,7 @@ mod rearranging;
 mod removing;
 mod report;
 mod selecting;
+mod shapes;
 mod split;
 mod typing;
 

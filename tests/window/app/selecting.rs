@@ -5,7 +5,7 @@ use std::path::Path;
 use egui::{Event, Key, Modifiers, PointerButton, Pos2, Rect};
 use egui_kittest::kittest::Queryable;
 
-use fmlgs::ui::actions::Action;
+use fmlgs::ui::actions::{Action, Pane};
 use fmlgs::ui::app::App;
 
 use super::Window;
@@ -158,6 +158,41 @@ fn a_scene_is_prepared_once_and_as_soon_as_the_tool_opens() {
     click(&mut w, box_1, Modifiers::NONE);
     w.until("an answer", |a| a.viewport.selection().is_some_and(|n| n > 0));
     assert_eq!(w.app().viewport.times_prepared(), 1, "once for all of them");
+}
+
+#[test]
+fn a_scene_that_was_prepared_is_ready_when_it_is_opened_again() {
+    let folder = tempfile::tempdir().expect("folder");
+    let mut w = asked(folder.path());
+    let box_1 = middle_of(&w, 2);
+    let select = |w: &mut Window| {
+        w.ask(Action::SegmentNew(Some(0)));
+        w.until("a picture for it", |a| a.viewport.picture().is_some_and(|p| p.full));
+        click(w, box_1, Modifiers::NONE);
+        w.until("an answer", |a| a.viewport.selection().is_some_and(|n| n > 0));
+        (w.app().viewport.selection(), w.app().viewport.times_prepared())
+    };
+    let (first, times) = select(&mut w);
+    assert_eq!(times, 1);
+    drop(w);
+    let scene = folder.path().join("scene");
+    let open = |scene: &Path| {
+        let mut w = Window::new(Some(Action::Open(scene.into())));
+        w.until("a picture at rest", |a| a.viewport.picture().is_some_and(|p| p.full));
+        w.harness.state_mut().layout.hidden.extend([Pane::Training, Pane::Plan, Pane::Models, Pane::Dataset]);
+        w.harness.run_steps(2);
+        w.harness.state_mut().layout.cameras = false;
+        w.ask(Action::Ask("box 0".into()));
+        w.until("maps", at_rest);
+        w
+    };
+    let mut w = open(&scene);
+    assert_eq!(select(&mut w), (first, 0), "the same, without preparing it again");
+    drop(w);
+    // The control: a damaged file is made anew.
+    std::fs::write(scene.join("selection_tree.safetensors"), b"damaged").expect("written");
+    let mut w = open(&scene);
+    assert_eq!(select(&mut w), (first, 1));
 }
 
 #[test]

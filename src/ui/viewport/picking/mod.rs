@@ -157,7 +157,7 @@ impl DrawnOutline {
 }
 
 /// The innermost identity at a window position.
-fn innermost(map: &ViewMap, shown: Rect, pos: Pos2) -> Option<IdentityId> {
+pub(super) fn innermost(map: &ViewMap, shown: Rect, pos: Pos2) -> Option<IdentityId> {
     let at = (pos - shown.min) / shown.size();
     let inside = |v: f32, n: usize| (0.0..1.0).contains(&v).then_some((v * n as f32) as usize);
     let (x, y) = (inside(at.x, map.width_px)?, inside(at.y, map.height_px)?);

@@ -2,13 +2,11 @@
 //! and owns its jobs.
 
 pub(crate) mod crop;
-pub(crate) mod eyedropper;
 pub(crate) mod inspect;
 pub(crate) mod mask_brush;
 pub(crate) mod preparation;
 pub(crate) mod ruler;
-pub(crate) mod segment;
-pub(crate) mod splat_brush;
+pub(crate) mod select;
 pub(crate) mod transform;
 
 use std::ops::RangeInclusive;
@@ -16,13 +14,11 @@ use std::ops::RangeInclusive;
 use egui::{Align2, Area, Id, Order, Rect, Response, Ui};
 
 use self::crop::CropTool;
-use self::eyedropper::Eyedropper;
 use self::inspect::Inspector;
 use self::mask_brush::MaskBrush;
 use self::preparation::SelectionPreparation;
 use self::ruler::Ruler;
-use self::segment::SegmentTool;
-use self::splat_brush::{Brushed, SplatBrush};
+use self::select::SelectTool;
 use self::transform::TransformTool;
 use super::display::Display;
 use super::eye::Eye;
@@ -44,9 +40,7 @@ pub(crate) enum Tool {
     Crop(CropTool),
     Inspect(Box<Inspector>),
     MaskBrush(MaskBrush),
-    SplatBrush(SplatBrush),
-    Eyedropper(Eyedropper),
-    Segment(Box<SegmentTool>),
+    Select(Box<SelectTool>),
     Transform(TransformTool),
 }
 
@@ -57,9 +51,7 @@ impl Tool {
             Self::Crop(tool) => tool,
             Self::Inspect(tool) => &mut **tool,
             Self::MaskBrush(tool) => tool,
-            Self::SplatBrush(tool) => tool,
-            Self::Eyedropper(tool) => tool,
-            Self::Segment(tool) => &mut **tool,
+            Self::Select(tool) => &mut **tool,
             Self::Transform(tool) => tool,
         }
     }
@@ -138,11 +130,6 @@ pub(super) trait ViewTool {
 
     /// Draws over the frame of a view; handles for dragging are widgets.
     fn paint(&mut self, _ui: &Ui, _area: ViewArea, _scene: &mut ToolScene<'_>, _cx: &mut Ctx<'_>) {}
-
-    /// Takes the Gaussians that were chosen, or taken out of the choice, since the last call.
-    fn take_brushed(&mut self) -> Vec<Brushed> {
-        Vec::new()
-    }
 
     /// Draws the card.
     fn card(&mut self, ui: &Ui, places: CardPlaces, scene: &mut ToolScene<'_>, cx: &mut Ctx<'_>);

@@ -140,6 +140,19 @@ impl TransformTool {
                     }
                 }
             });
+            ui.horizontal(|ui| {
+                let grade = &mut self.arrangement.grade;
+                for (value, name) in [(&mut grade.brightness, "Brightness"), (&mut grade.saturation, "Saturation")] {
+                    ui.label(name);
+                    let field = DragValue::new(value).speed(0.01).range(0.0..=4.0).max_decimals(2);
+                    ui.add(field).accessible_name(name);
+                }
+                ui.label("Tint").on_hover_text("White becomes this color, at its brightness.");
+                let mut shown = grade.tint.map(|v| (255.0 * v).round() as u8);
+                if ui.color_edit_button_srgb(&mut shown).changed() && shown != [0; 3] {
+                    grade.tint = shown.map(|v| f32::from(v) / 255.0);
+                }
+            });
             ui.checkbox(&mut self.arrangement.duplicate, "Apply to a copy");
             ui.horizontal(|ui| {
                 let keep = Action::ApplyTransform;

@@ -58,11 +58,6 @@ impl Hierarchy {
         Self { leaf, leaves: count, tree, area: surface.pieces.iter().map(|p| p.area).collect() }
     }
 
-    /// Number of Gaussians.
-    pub(crate) fn gaussians(&self) -> usize {
-        self.leaf.len()
-    }
-
     /// Returns the Gaussians that the marks select, starting from the Gaussians `from` if a selection is corrected
     /// (indices).
     ///

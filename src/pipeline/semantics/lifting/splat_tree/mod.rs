@@ -12,4 +12,5 @@
 pub(crate) mod hierarchy;
 mod labels;
 pub(crate) mod marks;
+pub(crate) mod stored;
 mod surface;

@@ -1,0 +1,164 @@
+//! The card of the selection: shape, changes, and what becomes of it.
+
+use egui::{Button, ComboBox, Key, ProgressBar, Rect, Slider, TextEdit, Ui};
+use strum::VariantArray;
+
+use super::super::{ToolScene, bottom_card};
+use super::SelectTool;
+use crate::jobs::select::{SelectFor, SelectStep};
+use crate::math::format;
+use crate::scene::{Identities, Level, NO_IDENTITY};
+use crate::ui::actions::Action;
+use crate::ui::ctx::Ctx;
+use crate::ui::labels::sentence;
+use crate::ui::select_shape::SelectShape;
+use crate::ui::{keys, theme};
+
+/// Draws the card at the bottom of the view in `rect`.
+pub(super) fn show(tool: &mut SelectTool, ui: &Ui, rect: Rect, scene: &ToolScene<'_>, cx: &mut Ctx<'_>) {
+    let (none, state) = (Identities::default(), cx.state);
+    let all = state.semantics.as_ref().map_or(&none, |map| &map.identities);
+    bottom_card(ui, "selecting", rect, 220.0..=470.0, |ui| {
+        let what = match tool.purpose {
+            SelectFor::New(NO_IDENTITY) => "New object".to_owned(),
+            SelectFor::New(of) => format!("New part of {}", all.full_name(of)),
+            SelectFor::Extent(id) => format!("Correct {}", all.full_name(id)),
+        };
+        ui.label(format!("{what}: {}", tool.shape.hint()));
+        ui.weak("Shift removes. Backspace undoes. Right-drag and wheel move the view.");
+        ui.horizontal_wrapped(|ui| {
+            for shape in SelectShape::VARIANTS {
+                let button = ui.selectable_label(tool.shape == *shape, sentence(<&str>::from(shape)));
+                if button.on_hover_text(sentence(shape.hint())).clicked() {
+                    tool.shape = *shape;
+                }
+            }
+        });
+        options(tool, ui);
+        changes(tool, ui, scene);
+        if let SelectFor::New(of) = tool.purpose {
+            ui.horizontal(|ui| {
+                ui.label("Keep as");
+                let name = TextEdit::singleline(&mut tool.name).hint_text("Name").char_limit(80);
+                let name = ui.add(name.desired_width(130.0)).accessible_name("Name of what is selected");
+                if name.lost_focus() && ui.input(|i| i.key_pressed(Key::Enter)) && !tool.is_empty() {
+                    cx.ask(Action::AddPainted);
+                }
+                let text =
+                    if of == NO_IDENTITY { "an object".to_owned() } else { format!("part of {}", all.label(of)) };
+                let whole = ComboBox::from_id_salt("whole").selected_text(text).width(120.0);
+                let whole = whole.show_ui(ui, |ui| {
+                    ui.selectable_value(&mut tool.purpose, SelectFor::New(NO_IDENTITY), "an object");
+                    for (id, _) in all.iter().filter(|(_, i)| i.level == Level::Object) {
+                        let text = format!("part of {}", all.label(id));
+                        ui.selectable_value(&mut tool.purpose, SelectFor::New(id), text);
+                    }
+                });
+                whole.response.accessible_name("What it becomes");
+            });
+        }
+        ui.horizontal(|ui| {
+            if ui.add_enabled(!tool.is_empty(), theme::primary_button("Keep")).clicked() {
+                cx.ask(Action::AddPainted);
+            }
+            if let SelectFor::New(of) = tool.purpose {
+                let next = ui.add_enabled(!tool.is_empty(), Button::new("Keep and next"));
+                if next.on_hover_text("Keep it, and select another one.").clicked() {
+                    cx.ask(Action::AddPainted);
+                    cx.ask(Action::SegmentNew(Some(of)));
+                }
+            }
+            ui.add_enabled_ui(!tool.is_empty(), |ui| {
+                let menu = ui.menu_button("More", |ui| {
+                    for action in [Action::DeleteChosen, Action::ExportSelection] {
+                        if ui.button(action.text()).on_hover_text(action.tooltip()).clicked() {
+                            cx.ask(action);
+                            ui.close();
+                        }
+                    }
+                });
+                menu.response.on_hover_text("Delete or export the selected Gaussians.");
+            });
+            if ui.button("Cancel").clicked() {
+                cx.ask(Action::SegmentNew(None));
+            }
+            status(tool, ui, scene, cx);
+        });
+    });
+    if !keys::is_typing(ui.ctx()) && ui.input(|i| i.key_pressed(Key::Backspace)) && tool.has_steps() {
+        tool.take_back();
+    }
+}
+
+/// Draws the options of the shape.
+fn options(tool: &mut SelectTool, ui: &mut Ui) {
+    ui.horizontal(|ui| {
+        ui.selectable_value(&mut tool.takes_away, false, "+ add");
+        ui.selectable_value(&mut tool.takes_away, true, "\u{2212} remove");
+        let slider = match tool.shape {
+            SelectShape::Click => Some(("Width", Slider::new(&mut tool.line_pt, 2.0..=30.0))),
+            SelectShape::Brush | SelectShape::Sphere => Some(("Radius", Slider::new(&mut tool.brush_pt, 2.0..=120.0))),
+            SelectShape::Color => Some(("Tolerance", Slider::new(&mut tool.tolerance, 0.01..=0.6))),
+            SelectShape::Object | SelectShape::Lasso | SelectShape::Rectangle => None,
+        };
+        if let Some((name, slider)) = slider {
+            ui.label(name);
+            ui.add(slider.show_value(false)).accessible_name(name);
+        }
+        if tool.shape.is_area() {
+            ui.checkbox(&mut tool.through, "Through").on_hover_text("Take what lies behind the surface, too.");
+        }
+    });
+}
+
+/// Draws the changes of the whole selection.
+fn changes(tool: &mut SelectTool, ui: &mut Ui, scene: &ToolScene<'_>) {
+    ui.horizontal(|ui| {
+        let button = |ui: &mut Ui, is_possible: bool, text: &str, tip: &str| {
+            ui.add_enabled(is_possible, Button::new(text)).on_hover_text(tip).clicked()
+        };
+        let is_some = !tool.is_empty();
+        let mut step = None;
+        if button(ui, is_some, "Grow", "Take the neighbors of the selected Gaussians, too.") {
+            step = Some(SelectStep::Grow);
+        }
+        if button(ui, is_some, "Shrink", "Leave out Gaussians with a neighbor that is not selected.") {
+            step = Some(SelectStep::Shrink);
+        }
+        let crop = scene.visibility.crop();
+        if button(ui, crop.is_some(), "In the box", "Take what the crop box keeps. B shows the box.")
+            && let Some((cloud, crop)) = scene.cloud.zip(crop)
+        {
+            let inside = (0..cloud.len()).filter(|i| crop.keeps(cloud.world_position(*i)));
+            step = Some(SelectStep::Add(inside.map(|i| i as u32).collect()));
+        }
+        tool.waiting.extend(step.map(|step| (step, false)));
+        if button(ui, tool.has_steps(), "Undo", "Undo the last step (Backspace).") {
+            tool.take_back();
+        }
+        let tip = "Show each selected Gaussian in magenta, faint ones, too.";
+        ui.checkbox(&mut tool.marks, "Mark").on_hover_text(tip);
+    });
+}
+
+/// Draws the state of the selection.
+fn status(tool: &SelectTool, ui: &mut Ui, scene: &ToolScene<'_>, cx: &Ctx<'_>) {
+    let text = match &tool.selected {
+        _ if tool.running.is_some() => {
+            ui.spinner();
+            String::new()
+        }
+        _ if !tool.is_prepared && tool.shape == SelectShape::Click => {
+            let text = "Preparing clicks, once for this scene";
+            let bar = ProgressBar::new(scene.preparation.share(cx.state).unwrap_or(0.0)).desired_width(60.0);
+            ui.add(bar.desired_height(6.0)).on_hover_text(text);
+            "Preparing\u{2026}".to_owned()
+        }
+        Some(s) if s.id != NO_IDENTITY => {
+            format!("{}, {:.0} ms", format::things(s.gaussians.len(), "Gaussian"), s.ms)
+        }
+        Some(_) => "Nothing is selected".to_owned(),
+        None => String::new(),
+    };
+    ui.weak(text);
+}
