@@ -4,6 +4,7 @@ use std::collections::{BTreeMap, VecDeque};
 use std::path::PathBuf;
 use std::sync::Arc;
 
+use super::act::measure::StoredMeasurements;
 use super::actions::Action;
 use super::camera::CameraPane;
 use super::chat::Chat;
@@ -77,6 +78,7 @@ pub struct App {
     pub(crate) camera: CameraPane,
     /// The conversation with the agent.
     pub(crate) chat: Chat,
+    pub(super) measured: StoredMeasurements,
     pub(super) toasts: Toasts,
     pub(super) actions: Vec<Action>,
     /// Window time of the last frame, s.
@@ -140,6 +142,7 @@ impl App {
             report: ReportPane::default(),
             camera: CameraPane::default(),
             chat: Chat::default(),
+            measured: StoredMeasurements::default(),
             toasts: Toasts::default(),
             last_frame: 0.0,
             traced: 0,

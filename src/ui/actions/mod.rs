@@ -152,8 +152,15 @@ impl Action {
     pub(crate) fn all() -> Vec<Self> {
         let mut all = Self::plain();
         // These need a tool in use.
-        all.retain(|a| !matches!(a, Self::AddPainted | Self::ApplyTransform | Self::DeleteChosen));
-        all.extend([Self::Isolate(None), Self::SegmentNew(Some(NO_IDENTITY)), Self::SetCrop(None)]);
+        all.retain(|a| {
+            !matches!(a, Self::AddPainted | Self::ApplyTransform | Self::DeleteChosen | Self::KeepMeasurement)
+        });
+        all.extend([
+            Self::Isolate(None),
+            Self::SegmentNew(Some(NO_IDENTITY)),
+            Self::SetCrop(None),
+            Self::Turntable(None),
+        ]);
         all.extend(ViewMode::VARIANTS.iter().map(|mode| Self::Show(*mode)));
         all.extend(Pane::VARIANTS.iter().map(|pane| Self::ShowPane(*pane)));
         all.extend(THEMES.map(Self::UseTheme));

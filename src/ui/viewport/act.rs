@@ -19,7 +19,7 @@ use crate::jobs::rearrange::Arrangement;
 use crate::jobs::select::SelectFor;
 use crate::navigate::Pose;
 use crate::pipeline::semantics::lifting::edit::Edit;
-use crate::scene::{CropBox, IdentityId};
+use crate::scene::{Bounds, CropBox, IdentityId};
 use crate::worker::Tasks;
 
 /// The camera.
@@ -31,6 +31,11 @@ impl Viewport {
         let selected = self.parts().1.selected_bounds(state.semantics.as_ref());
         self.eye.frame(selected.as_ref().unwrap_or(&scene.home.bounds));
         self.moved_at = now;
+    }
+
+    /// Bounds of an identity without outliers, if it has Gaussians.
+    pub(crate) fn bounds_of(&mut self, id: IdentityId, state: &AppState) -> Option<Bounds> {
+        self.marks.bounds(self.cloud.as_ref()?, state.semantics.as_ref()?, id)
     }
 
     /// Goes to the first view of the scene.
@@ -113,6 +118,22 @@ impl Viewport {
     pub(crate) fn measure(&mut self, state: &AppState) {
         let in_use = matches!(self.tool, Some(Tool::Ruler(_)));
         self.toggle(in_use, state, |_, _| Tool::Ruler(Ruler::default()));
+    }
+
+    /// True if the ruler has a value to keep.
+    pub(crate) fn can_keep_measurement(&mut self, state: &AppState) -> bool {
+        let (tool, rest) = self.parts();
+        matches!(tool, Some(Tool::Ruler(ruler)) if ruler.has_value(&rest, state))
+    }
+
+    /// Keeps what the ruler has measured; returns its name.
+    pub(crate) fn take_measurement(&mut self, state: &AppState) -> Option<String> {
+        let (tool, rest) = self.parts();
+        let Some(Tool::Ruler(ruler)) = tool else { return None };
+        let made = ruler.take(&rest, state)?;
+        let name = made.name.clone();
+        rest.measurements.push(made);
+        Some(name)
     }
 
     /// Begins or ends the edit of the crop box; there is one from then on.
