@@ -10,7 +10,7 @@ use rayon::prelude::*;
 use serde_json::{Value, json};
 
 use super::{JobError, export};
-use crate::io::measurements::load;
+pub(crate) use crate::io::measurements::load;
 use crate::io::{IoError, SceneFolder, trained};
 use crate::pipeline::observer::{Observer, Severity};
 use crate::scene::GaussianCloud;

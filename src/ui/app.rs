@@ -4,7 +4,6 @@ use std::collections::{BTreeMap, VecDeque};
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use super::act::measure::StoredMeasurements;
 use super::actions::Action;
 use super::camera::CameraPane;
 use super::chat::Chat;
@@ -21,6 +20,7 @@ use super::panes::{
     photos::PhotosPane, phrases::PhrasesPane, report::ReportPane, training::TrainingPane,
 };
 use super::state::{AppState, Tone};
+use super::stored_measurements::StoredMeasurements;
 use super::theme;
 use super::toasts::Toasts;
 use super::viewport::Viewport;

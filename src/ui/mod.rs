@@ -30,6 +30,7 @@ pub(crate) mod object_menu;
 pub(crate) mod palette;
 pub(crate) mod panes;
 pub(crate) mod state;
+mod stored_measurements;
 mod text_field;
 pub(crate) mod theme;
 pub(crate) mod toasts;

@@ -1,29 +1,13 @@
 //! Measurements: kept, stored with the scene, and exported.
 
-use std::path::PathBuf;
-
 use super::{export, remote};
 use crate::jobs::measurements;
 use crate::pipeline::observer::Observer;
-use crate::scene::measurement::Measurement;
 use crate::ui::app::App;
 use crate::ui::file_dialogs::FileRequest;
 use crate::ui::state::Tone;
+use crate::ui::stored_measurements::StoredMeasurements;
 use crate::worker::JobInfo;
-
-/// Measurements as they are stored, to know what was changed since.
-#[derive(Default)]
-pub(in crate::ui) struct StoredMeasurements {
-    /// Number and folder of their scene.
-    of: (u64, PathBuf),
-    stored: Vec<Measurement>,
-    /// Those that were tried last, and whether the folder held a result then.
-    tried: Option<(Vec<Measurement>, bool)>,
-    /// True if they are being stored.
-    is_storing: bool,
-    /// True if the user knows that they are not stored.
-    is_told: bool,
-}
 
 /// Keeps the measurement that the ruler has made.
 pub(in crate::ui) fn keep(app: &mut App) {
