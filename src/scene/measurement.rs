@@ -111,6 +111,9 @@ impl MeasuredValue {
             Self::Length(length) => format::length(*length, meters_per_unit),
             Self::Angle(angle) => format!("{:.1}\u{b0}", angle.to_degrees()),
             Self::Area(fit) => format::area(fit.area, meters_per_unit),
+            Self::Box(edges) if meters_per_unit.is_none() => {
+                format!("{} units", edges.map(format::short).join(" \u{d7} "))
+            }
             Self::Box(edges) => {
                 let edges = edges.map(|edge| format::length(edge, meters_per_unit));
                 edges.join(" \u{d7} ")
@@ -191,6 +194,7 @@ mod tests {
         assert_eq!(remark.as_deref(), Some("corners within 0 mm of a plane (RMS 0 mm)"));
         assert_eq!(of(MeasurementKind::Angle, &square[..3]).text(None), "90.0\u{b0}");
         let cube = of(MeasurementKind::Box, &[DVec3::ZERO, DVec3::X * 3.0, DVec3::Y * 2.0, DVec3::Z]);
+        assert_eq!(cube.text(None), "3 \u{d7} 2 \u{d7} 1 units");
         assert_eq!(cube.text(Some(1.0)), "3 m \u{d7} 2 m \u{d7} 1 m");
         let volume = cube.value().expect("a box").remark(Some(1.0));
         assert_eq!(volume.as_deref(), Some("volume of the box 6.000 m\u{b3}"));

@@ -11,9 +11,8 @@ use crate::worker::JobInfo;
 
 /// Keeps the measurement that the ruler has made.
 pub(in crate::ui) fn keep(app: &mut App) {
-    match app.viewport.take_measurement(&app.state) {
-        Some(name) => app.state.say(Tone::Info, format!("Measured {name}")),
-        None => app.state.toast(Tone::Info, "There is nothing to keep yet: measure something first (M)."),
+    if !app.viewport.take_measurement(&app.state) {
+        app.state.toast(Tone::Info, "There is nothing to keep yet: measure something first (M).");
     }
 }
 

@@ -126,14 +126,12 @@ impl Viewport {
         matches!(tool, Some(Tool::Ruler(ruler)) if ruler.has_value(&rest, state))
     }
 
-    /// Keeps what the ruler has measured; returns its name.
-    pub(crate) fn take_measurement(&mut self, state: &AppState) -> Option<String> {
+    /// Keeps what the ruler has measured. Returns false if there is nothing to keep.
+    pub(crate) fn take_measurement(&mut self, state: &AppState) -> bool {
         let (tool, rest) = self.parts();
-        let Some(Tool::Ruler(ruler)) = tool else { return None };
-        let made = ruler.take(&rest, state)?;
-        let name = made.name.clone();
-        rest.measurements.push(made);
-        Some(name)
+        let Some(Tool::Ruler(ruler)) = tool else { return false };
+        let made = ruler.take(&rest, state);
+        made.map(|made| rest.measurements.push(made)).is_some()
     }
 
     /// Begins or ends the edit of the crop box; there is one from then on.
