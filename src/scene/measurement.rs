@@ -125,6 +125,8 @@ impl MeasuredValue {
     pub(crate) fn remark(&self, meters_per_unit: Option<f64>) -> Option<String> {
         match self {
             Self::Length(_) | Self::Angle(_) => None,
+            // Three corners are always in a plane.
+            Self::Area(fit) if fit.farthest <= 1e-9 * fit.area.sqrt() => None,
             Self::Area(fit) => {
                 let [rms, most] = [fit.rms, fit.farthest].map(|d| format::length(d, meters_per_unit));
                 Some(format!("corners within {most} of a plane (RMS {rms})"))
@@ -188,10 +190,14 @@ mod tests {
         let square = [DVec3::ZERO, DVec3::X, DVec3::new(1.0, 1.0, 0.0), DVec3::Y].to_vec();
         let of = |kind, points: &[DVec3]| Measurement { kind, points: points.to_vec(), ..line(1, "") };
         assert_eq!((line(1, "a").text(None), line(1, "a").text(Some(0.1))), ("2 units".into(), "20 cm".into()));
+        let mut square = square;
+        square[2].z = 0.01;
         let area = of(MeasurementKind::Area, &square);
         assert_eq!((area.text(None), area.text(Some(2.0))), ("1.000 units\u{b2}".into(), "4.000 m\u{b2}".into()));
         let remark = area.value().expect("an area").remark(Some(2.0));
-        assert_eq!(remark.as_deref(), Some("corners within 0 mm of a plane (RMS 0 mm)"));
+        assert_eq!(remark.as_deref(), Some("corners within 5 mm of a plane (RMS 5 mm)"));
+        let flat = of(MeasurementKind::Area, &square[..3]).value().expect("an area");
+        assert_eq!(flat.remark(None), None, "three corners are always in a plane");
         assert_eq!(of(MeasurementKind::Angle, &square[..3]).text(None), "90.0\u{b0}");
         let cube = of(MeasurementKind::Box, &[DVec3::ZERO, DVec3::X * 3.0, DVec3::Y * 2.0, DVec3::Z]);
         assert_eq!(cube.text(None), "3 \u{d7} 2 \u{d7} 1 units");

@@ -12,7 +12,7 @@ use crate::worker::JobInfo;
 /// Keeps the measurement that the ruler has made.
 pub(in crate::ui) fn keep(app: &mut App) {
     if !app.viewport.take_measurement(&app.state) {
-        app.state.toast(Tone::Info, "There is nothing to keep yet: measure something first (M).");
+        app.state.toast(Tone::Info, "There is nothing to keep yet: the measurement has no value.");
     }
 }
 

@@ -29,7 +29,7 @@ enum KeyChange {
 pub(crate) fn show(ui: &mut Ui, pane: &mut CameraPane, eye: &Pose) -> Option<Pose> {
     let mut wanted_change: Option<(usize, KeyChange)> = None;
     let more = pane.shows_more;
-    ScrollArea::both().auto_shrink([false, false]).show(ui, |ui| {
+    ScrollArea::horizontal().auto_shrink([false, true]).show(ui, |ui| {
         Grid::new("keys").num_columns(if more { 7 } else { 4 }).striped(true).spacing([10.0, 4.0]).show(ui, |ui| {
             for text in ["", "Name", "Time", ""] {
                 ui.label(caption(text));
@@ -93,8 +93,10 @@ fn row(ui: &mut Ui, i: usize, key: &mut PathKey, chosen: bool) -> Option<KeyChan
     }
     let named = |what: &str| format!("{what} of keyframe {}", i + 1);
     let mut name = key.name.clone().unwrap_or_default();
-    let edit = TextEdit::singleline(&mut name).desired_width(NAME_PT).char_limit(80).hint_text("name");
-    ui.add(edit).accessible_name(named("Name"));
+    let edit = TextEdit::singleline(&mut name).char_limit(80).hint_text("name");
+    // As high as the other cells, else it stands lower.
+    let size = egui::vec2(NAME_PT, ui.spacing().interact_size.y);
+    ui.add_sized(size, edit.align(egui::Align2::LEFT_CENTER)).accessible_name(named("Name"));
     key.name = Some(name).filter(|n| !n.is_empty());
     ui.horizontal(|ui| {
         let mut fixed = key.time_secs.is_some();

@@ -8,7 +8,7 @@ mod timeline;
 use std::collections::VecDeque;
 use std::path::Path;
 
-use egui::{Align, Button, Checkbox, ComboBox, DragValue, Layout, RichText, Slider, Ui, vec2};
+use egui::{Align, Button, Checkbox, ComboBox, DragValue, Layout, RichText, ScrollArea, Slider, Ui, vec2};
 
 use self::player::{Clip, Player};
 use super::ctx::Ctx;
@@ -294,26 +294,26 @@ impl CameraPane {
                 cx.ask(action);
             }
         }
+        let has_keys = !self.path.keys.is_empty();
+        let duration = ui.label("Duration").id;
+        let seconds = DragValue::new(&mut self.path.seconds).range(0.1..=3600.0).speed(0.05).suffix(" s");
+        ui.add_enabled(has_keys, seconds).labelled_by(duration);
+        ui.add_enabled(has_keys, Checkbox::new(&mut self.path.closed, "Closed loop"))
+            .on_hover_text("Continue from the last keyframe to the first.");
+        let mut eased = self.speed == Speed::Eased;
+        ui.add_enabled(has_keys, Checkbox::new(&mut eased, "Ease in/out"))
+            .on_hover_text("Start and stop smoothly, also at waits.");
+        self.speed = if eased { Speed::Eased } else { Speed::Constant };
+    }
+
+    /// Draws the choice of what is shown of the path.
+    fn shown(&mut self, ui: &mut Ui, cx: &Ctx<'_>) {
         ui.add_enabled(cx.state.explored.is_some(), Checkbox::new(&mut self.show_reach, "Show reach"))
             .on_hover_text("Mark the places that the camera can go to: green; red ones cannot be reached from here.")
             .on_disabled_hover_text("Known once the camera has gone to an object.");
         ui.add_enabled(!self.path.keys.is_empty(), Checkbox::new(&mut self.shows_more, "More columns"))
             .on_hover_text("Field of view, roll and wait of each keyframe.")
             .on_disabled_hover_text(NO_KEYS);
-    }
-
-    fn timing(&mut self, ui: &mut Ui) {
-        if self.path.keys.is_empty() {
-            ui.disable();
-        }
-        let duration = ui.label("Duration").id;
-        ui.add(DragValue::new(&mut self.path.seconds).range(0.1..=3600.0).speed(0.05).suffix(" s"))
-            .labelled_by(duration);
-        ui.checkbox(&mut self.path.closed, "Closed loop")
-            .on_hover_text("Continue from the last keyframe to the first.");
-        let mut eased = self.speed == Speed::Eased;
-        ui.checkbox(&mut eased, "Ease in/out").on_hover_text("Start and stop smoothly, also at waits.");
-        self.speed = if eased { Speed::Eased } else { Speed::Constant };
     }
 
     fn video_tools(&mut self, ui: &mut Ui, cx: &mut Ctx<'_>) {
@@ -349,22 +349,23 @@ impl PaneContents for CameraPane {
     fn ui(&mut self, ui: &mut Ui, cx: &mut Ctx<'_>, view: &mut Viewport) {
         let eye = view.pose();
         self.keep_up();
-        ui.horizontal_wrapped(|ui| self.controls(ui, cx));
+        ui.horizontal_wrapped(|ui| {
+            self.controls(ui, cx);
+            self.shown(ui, cx);
+        });
         ui.add_space(2.0);
         let mut wanted = timeline::show(ui, self);
         ui.add_space(2.0);
-        row(ui, "Path", |ui| self.path_tools(ui, cx));
-        row(ui, "Timing", |ui| self.timing(ui));
-        row(ui, "Video", |ui| self.video_tools(ui, cx));
-        if self.path.keys.is_empty() {
-            ui.add_space(4.0);
-            ui.weak(
-                "No keyframes yet. Add the current view (K), open a path, or go to an object and convert the \
-                 flight.",
-            );
-        } else {
-            wanted = keys::show(ui, self, &eye).or(wanted);
-        }
+        ScrollArea::vertical().auto_shrink([false, false]).show(ui, |ui| {
+            row(ui, "Path", |ui| self.path_tools(ui, cx));
+            row(ui, "Video", |ui| self.video_tools(ui, cx));
+            if self.path.keys.is_empty() {
+                ui.add_space(4.0);
+                ui.weak("No keyframes yet. Add the current view (K), open a path, or convert the flight to an object.");
+            } else {
+                wanted = keys::show(ui, self, &eye).or(wanted);
+            }
+        });
         if let Some(pose) = wanted {
             view.stand(&pose, cx.state, ui.input(|i| i.time));
         }

@@ -26,8 +26,8 @@ pub(super) fn take(app: &mut App, ctx: &Context) {
     }
     query::follow_vain_query(app, ctx);
     if !app.palette.is_open() && !has_dialog && !app.sheet && !has_menu {
-        // While a value is measured, Enter keeps it.
-        let keeps = !keys::is_typing(ctx) && app.viewport.can_keep_measurement(&app.state);
+        // While something is measured, Enter keeps it.
+        let keeps = !keys::is_typing(ctx) && app.viewport.is_measuring();
         if keeps
             && ctx.memory(|m| m.focused()).is_none()
             && ctx.input_mut(|i| i.consume_key(Modifiers::NONE, Key::Enter))

@@ -116,14 +116,13 @@ impl Viewport {
 
     /// Begins or ends measuring.
     pub(crate) fn measure(&mut self, state: &AppState) {
-        let in_use = matches!(self.tool, Some(Tool::Ruler(_)));
+        let in_use = self.is_measuring();
         self.toggle(in_use, state, |_, _| Tool::Ruler(Ruler::default()));
     }
 
-    /// True if the ruler has a value to keep.
-    pub(crate) fn can_keep_measurement(&mut self, state: &AppState) -> bool {
-        let (tool, rest) = self.parts();
-        matches!(tool, Some(Tool::Ruler(ruler)) if ruler.has_value(&rest, state))
+    /// True if the ruler is in use.
+    pub(crate) fn is_measuring(&self) -> bool {
+        matches!(self.tool, Some(Tool::Ruler(_)))
     }
 
     /// Keeps what the ruler has measured. Returns false if there is nothing to keep.

@@ -74,7 +74,8 @@ impl DrawnMeasurement {
             let of = |pair: &[DVec3]| ((pair[0] + pair[1]) * 0.5, format::length(pair[0].distance(pair[1]), meters));
             labels.extend(self.points.windows(2).map(of));
         }
-        labels.extend(self.middle().zip(self.label.clone()));
+        let total = if labels.is_empty() { "" } else { "total " };
+        labels.extend(self.middle().zip(self.label.as_ref().map(|label| format!("{total}{label}"))));
         labels
     }
 }

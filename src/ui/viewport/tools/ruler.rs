@@ -7,6 +7,7 @@ use glam::{DVec2, DVec3};
 use super::super::measured::DrawnMeasurement;
 use super::super::split::ViewArea;
 use super::{CardPlaces, ToolScene, ViewTool, bottom_card};
+use crate::math::format;
 use crate::math::geometry::GeometryFault;
 use crate::scene::measurement::{MeasuredValue, Measurement, MeasurementKind, free_name};
 use crate::scene::upright_box::UprightBox;
@@ -27,11 +28,13 @@ pub(crate) struct Ruler {
     points: Vec<DVec3>,
     /// The true length, as typed.
     known: String,
+    /// True if the last click met no surface.
+    missed: bool,
 }
 
 impl Default for Ruler {
     fn default() -> Self {
-        Self { kind: MeasurementKind::Length, points: Vec::new(), known: String::new() }
+        Self { kind: MeasurementKind::Length, points: Vec::new(), known: String::new(), missed: false }
     }
 }
 
@@ -56,11 +59,6 @@ impl Ruler {
     /// The measurement so far, for the view.
     pub(in crate::ui::viewport) fn drawn(&self, scene: &ToolScene<'_>, state: &AppState) -> DrawnMeasurement {
         DrawnMeasurement::new(self.kind, self.measured(scene, state.semantics.as_ref()), meters_per_unit(state))
-    }
-
-    /// True if there is a value to keep.
-    pub(in crate::ui::viewport) fn has_value(&self, scene: &ToolScene<'_>, state: &AppState) -> bool {
-        self.kind.value(&self.measured(scene, state.semantics.as_ref())).is_ok()
     }
 
     /// Ends the measurement; returns it with a name and a number of its own, if it has a value.
@@ -93,6 +91,9 @@ impl Ruler {
     /// What to do next, or the value.
     fn says(&self, value: Result<MeasuredValue, GeometryFault>, state: &AppState) -> String {
         let meters = meters_per_unit(state);
+        if self.missed && self.kind != MeasurementKind::Box {
+            return "No surface there: click again".to_owned();
+        }
         match (value, self.kind, self.points.len()) {
             (Ok(value), ..) if meters.is_none() && !matches!(value, MeasuredValue::Angle(_)) => {
                 format!("{} (scale unknown)", value.text(None))
@@ -117,7 +118,7 @@ impl Ruler {
                     MeasurementKind::Box => "Edges and volume of the upright box around the selected object.",
                 };
                 if ui.selectable_value(&mut self.kind, kind, kind.text()).on_hover_text(tip).changed() {
-                    self.points.clear();
+                    (self.points, self.missed) = (Vec::new(), false);
                 }
             }
             ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
@@ -132,22 +133,22 @@ impl Ruler {
     fn uses(&mut self, ui: &mut Ui, value: &MeasuredValue, eye: DVec3, cx: &mut Ctx<'_>) {
         match value {
             MeasuredValue::Length(_) => {
-                ui.horizontal(|ui| {
-                    ui.label("True length");
-                    let known = TextEdit::singleline(&mut self.known).hint_text("0.30").desired_width(60.0);
-                    ui.add(known).accessible_name("True length in meters");
-                    ui.label("m");
-                    let scale = self.scale();
-                    let set = ui.add_enabled(scale.is_some(), Button::new("Set scale"));
-                    if let Some(scale) = scale.filter(|_| set.clicked()) {
-                        cx.ask(Action::SetScale(scale));
-                    }
-                });
+                ui.separator();
+                ui.label("True length");
+                let known = TextEdit::singleline(&mut self.known).hint_text("0.30").desired_width(50.0);
+                ui.add(known).accessible_name("True length in meters");
+                ui.label("m");
+                let scale = self.scale();
+                let set = ui.add_enabled(scale.is_some(), Button::new("Set scale"));
+                if let Some(scale) = scale.filter(|_| set.clicked()) {
+                    cx.ask(Action::SetScale(scale));
+                }
             }
             MeasuredValue::Area(fit) => {
                 let is_below = self.points.first().is_some_and(|p| fit.normal.dot(eye - *p) < 0.0);
                 let normal = if is_below { -fit.normal } else { fit.normal };
-                if ui.button("Use this plane as the floor").on_hover_text(Action::SetUp(normal).tooltip()).clicked() {
+                ui.separator();
+                if ui.button("Use as the floor").on_hover_text(Action::SetUp(normal).tooltip()).clicked() {
                     cx.ask(Action::SetUp(normal));
                 }
             }
@@ -169,25 +170,28 @@ impl ViewTool for Ruler {
             scene.display.picked(DVec2::new(f64::from(at.x), f64::from(at.y)), scene.eye)
         };
         let clicked = response.interact_pointer_pos().filter(|pos| response.clicked() && area.shown.contains(*pos));
-        if let Some(point) = clicked.filter(|_| self.takes_clicks()).and_then(surface) {
-            self.put(point);
+        if let Some(pos) = clicked.filter(|_| self.takes_clicks()) {
+            let point = surface(pos);
+            self.missed = point.is_none();
+            point.into_iter().for_each(|point| self.put(point));
         }
     }
 
     /// Draws kinds, value and kept measurements.
     fn card(&mut self, ui: &Ui, places: CardPlaces, scene: &mut ToolScene<'_>, cx: &mut Ctx<'_>) {
         let state = cx.state;
-        bottom_card(ui, "ruler", places.active_view, 260.0..=400.0, |ui| {
+        // What grows is at the top, so that the rest stays under the pointer.
+        bottom_card(ui, "ruler", places.active_view, 260.0..=470.0, |ui| {
+            list(ui, scene.measurements, meters_per_unit(state), cx);
             self.kinds(ui, cx);
             let value = self.kind.value(&self.measured(scene, state.semantics.as_ref()));
-            ui.label(RichText::new(self.says(value, state)).strong());
-            if let Some(remark) = value.ok().and_then(|value| value.remark(meters_per_unit(state))) {
-                ui.weak(remark);
-            }
-            if let Ok(value) = &value {
-                self.uses(ui, value, scene.eye.center, cx);
-            }
-            ui.horizontal(|ui| {
+            ui.horizontal_wrapped(|ui| {
+                ui.label(RichText::new(self.says(value, state)).strong());
+                if let Some(remark) = value.ok().and_then(|value| value.remark(meters_per_unit(state))) {
+                    ui.weak(remark);
+                }
+            });
+            ui.horizontal_wrapped(|ui| {
                 let keep = ui.add_enabled(value.is_ok(), theme::primary_button("Keep"));
                 let keep = keep.on_hover_text(format!("{}  Enter", Action::KeepMeasurement.tooltip()));
                 if keep.on_disabled_hover_text("There is nothing to keep yet.").clicked() {
@@ -201,8 +205,10 @@ impl ViewTool for Ruler {
                 if ui.add_enabled(has_points, Button::new("Clear")).clicked() {
                     self.points.clear();
                 }
+                if let Ok(value) = &value {
+                    self.uses(ui, value, scene.eye.center, cx);
+                }
             });
-            list(ui, scene.measurements, meters_per_unit(state), cx);
         });
         if !keys::is_typing(ui.ctx()) && ui.input(|i| i.key_pressed(Key::Backspace)) {
             self.points.pop();
@@ -215,7 +221,14 @@ fn list(ui: &mut Ui, all: &mut Vec<Measurement>, meters: Option<f64>, cx: &mut C
     if all.is_empty() {
         return;
     }
-    ui.separator();
+    ui.horizontal(|ui| {
+        ui.label(format::things(all.len(), "measurement"));
+        ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
+            if ui.button("Export\u{2026}").on_hover_text(Action::ExportMeasurements.tooltip()).clicked() {
+                cx.ask(Action::ExportMeasurements);
+            }
+        });
+    });
     let mut gone = None;
     ScrollArea::vertical().max_height(LIST_PT).show(ui, |ui| {
         for (i, m) in all.iter_mut().enumerate() {
@@ -245,9 +258,7 @@ fn list(ui: &mut Ui, all: &mut Vec<Measurement>, meters: Option<f64>, cx: &mut C
     if let Some(gone) = gone {
         all.remove(gone);
     }
-    if ui.button("Export\u{2026}").on_hover_text(Action::ExportMeasurements.tooltip()).clicked() {
-        cx.ask(Action::ExportMeasurements);
-    }
+    ui.separator();
 }
 
 fn meters_per_unit(state: &AppState) -> Option<f64> {
