@@ -12,8 +12,9 @@ use super::{CliError, output};
 use crate::io::scene_files::MAP_FILE;
 use crate::io::trained::CLOUD_FILE;
 use crate::jobs::open::{self, Contents};
-use crate::jobs::{Scene, plan};
+use crate::jobs::{Scene, measurements, plan};
 use crate::pipeline::train::TrainConfig;
+use crate::scene::measurement::Measurement;
 use crate::scene::{Bounds, Dataset, PlanLine, ScenePlan, SemanticMap};
 
 /// Say what a folder or file holds, and the plan for it
@@ -193,7 +194,14 @@ fn of_trained(s: &Scene, folder: &Path) -> (Facts, Option<SemanticMap>) {
     let map = map.ok().flatten();
     let known = map.as_ref().map(|m| m.identities.len());
     lines.push(("objects and parts", known.map_or_else(|| "none known".into(), |n| n.to_string())));
-    let warnings = s.warnings.iter().cloned().chain(warning).collect();
+    let measured = measurements::load(folder);
+    let unread = measured.as_ref().err().map(|e| format!("its measurements cannot be read: {e}"));
+    let measured = measured.unwrap_or_default();
+    if !measured.is_empty() {
+        let one = |m: &Measurement| format!("{}: {}", m.name, m.text(s.meters_per_unit));
+        lines.push(("measurements", measured.iter().map(one).collect::<Vec<_>>().join("; ")));
+    }
+    let warnings = s.warnings.iter().cloned().chain(warning).chain(unread).collect();
     let mut facts = facts(lines, json, warnings);
     facts.json.insert("kind".into(), json!("trained"));
     facts.json.insert("name".into(), json!(s.name));
@@ -201,6 +209,7 @@ fn of_trained(s: &Scene, folder: &Path) -> (Facts, Option<SemanticMap>) {
     facts.json.insert("cameras".into(), json!(s.cameras));
     facts.json.insert("history".into(), json!(s.history));
     facts.json.insert("identities".into(), json!(known));
+    facts.json.insert("measured".into(), measurements::as_json(&measured, s.meters_per_unit));
     facts.json.insert("objects".into(), json!(map.as_ref().map(identities)));
     facts.json.insert("unknown".into(), json!(map.as_ref().and_then(|m| m.findings.as_ref()?.unknown())));
     (facts, map)

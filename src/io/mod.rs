@@ -25,6 +25,7 @@ pub mod ksplat;
 pub mod labels;
 mod lenses;
 pub mod llff;
+pub(crate) mod measurements;
 pub(crate) mod memory;
 mod morton;
 pub mod npy;

@@ -15,10 +15,12 @@ pub const MAP_FILE: &str = "semantic_map.safetensors";
 pub const CHECKPOINT_FILE: &str = "checkpoint.bin";
 /// Preparation for selections: made anew if it is missing.
 pub(crate) const SELECTION_FILE: &str = "selection_tree.safetensors";
+/// Measurements of the user.
+pub(crate) const MEASUREMENTS_FILE: &str = "measurements.json";
 /// Journal of a save that is decided and not yet carried out.
 pub(super) const JOURNAL: &str = ".fmlgs_commit.json";
 
-pub(crate) const FILES: [&str; 4] = [SCENE_FILE, CLOUD_FILE, MAP_FILE, CHECKPOINT_FILE];
+pub(crate) const FILES: [&str; 5] = [SCENE_FILE, CLOUD_FILE, MAP_FILE, CHECKPOINT_FILE, MEASUREMENTS_FILE];
 
 /// Returns whether `folder` is a trained scene.
 pub fn is_scene(folder: &Path) -> bool {

@@ -124,6 +124,19 @@ impl SceneFolder {
         commit.finish()
     }
 
+    /// Replaces a file that belongs to no state of the scene. Returns its path.
+    pub(super) fn save_beside(
+        &self,
+        name: &str,
+        fill: impl FnOnce(&mut dyn Write) -> io::Result<()>,
+    ) -> Result<PathBuf, IoError> {
+        let path = self.path().join(name);
+        let mut draft = Draft::beside(&path)?;
+        fill(&mut draft).map_err(|cause| write_error(&path, cause))?;
+        draft.commit()?;
+        Ok(path)
+    }
+
     /// Saves another map of the Gaussians `cloud`, which must be those of the scene in the state `known`.
     /// Returns the id of the new state.
     pub(crate) fn save_map(
@@ -187,10 +200,7 @@ impl SceneFolder {
     /// # Errors
     /// If it cannot be written; the earlier checkpoint is then unchanged.
     pub(crate) fn save_checkpoint(&self, fill: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> Result<(), IoError> {
-        let path = self.path().join(CHECKPOINT_FILE);
-        let mut draft = Draft::beside(&path)?;
-        fill(&mut draft).map_err(|cause| write_error(&path, cause))?;
-        draft.commit().map(drop)
+        self.save_beside(CHECKPOINT_FILE, fill).map(drop)
     }
 
     /// Keeps a copy of the current scene before it is replaced and returns its folder; `None` if it has no objects and

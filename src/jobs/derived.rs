@@ -6,7 +6,7 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use super::{JobError, Scene, export_splat};
+use super::{JobError, Scene, export_splat, measurements};
 use crate::io::splat_format::SplatFormat;
 use crate::io::trained::{self, SceneInfo};
 use crate::io::{IoError, SceneFolder, files};
@@ -123,7 +123,11 @@ pub(crate) fn store(
     if let (Some(dataset), Some(path)) = (&mut info.dataset, &from.dataset_path) {
         *dataset = dataset.moved(path, out);
     }
-    Ok(held.save(&info, cloud, map)?)
+    let state = held.save(&info, cloud, map)?;
+    if let Some(folder) = &from.folder {
+        measurements::carry_over(folder, [&from.cloud, cloud], &held)?;
+    }
+    Ok(state)
 }
 
 #[cfg(test)]

@@ -27,6 +27,7 @@ pub(crate) mod folders;
 pub(crate) mod go_to;
 pub(crate) mod held_out;
 pub(crate) mod inspect;
+pub(crate) mod measurements;
 pub(crate) mod models;
 pub mod open;
 pub(crate) mod page;

@@ -1,11 +1,13 @@
 //! Moving, duplicating and recoloring objects and parts, and deleting Gaussians.
 
+use std::collections::BTreeSet;
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use super::{JobError, Scene, derived, open};
+use super::{JobError, Scene, derived, measurements, open};
 use crate::io::SceneFolder;
 pub(crate) use crate::pipeline::splat_edit::{Arrangement, Grade, Placement, SplatEdit, apply};
+use crate::scene::measurement::Measurement;
 use crate::scene::{Camera, GaussianCloud, SceneFacts, SemanticMap};
 
 /// Returns the Gaussians of `scene` and its objects and parts, if it has any, after an edit.
@@ -34,6 +36,8 @@ pub struct RearrangeRequest {
     pub(crate) cloud: Arc<GaussianCloud>,
     pub(crate) map: Option<Arc<SemanticMap>>,
     pub(crate) change: SplatChange,
+    /// Measurements on screen.
+    pub(crate) measurements: Vec<Measurement>,
     /// Facts about the scene, and the photos' cameras.
     pub(crate) facts: SceneFacts,
     pub(crate) cameras: Vec<Camera>,
@@ -49,6 +53,8 @@ pub struct RearrangedScene {
     pub(crate) name: String,
     pub(crate) state: String,
     pub(crate) facts: SceneFacts,
+    /// Ids of the measurements that no longer hold.
+    pub(crate) stale: BTreeSet<u32>,
 }
 
 /// Applies a change and stores the result; `known` is the state in which the edited scene was last read.
@@ -57,11 +63,13 @@ pub struct RearrangedScene {
 /// If the edit is invalid or cannot be stored; nothing has changed then.
 pub(crate) fn run(request: &RearrangeRequest, known: Option<&str>) -> Result<RearrangedScene, JobError> {
     let RearrangeRequest { path, cloud, map, .. } = request;
-    let (cloud, map) = match &request.change {
-        SplatChange::Restore(cloud, map) => (Arc::clone(cloud), map.clone()),
+    let (cloud, map, stale) = match &request.change {
+        // Their measurements are restored, too.
+        SplatChange::Restore(cloud, map) => (Arc::clone(cloud), map.clone(), BTreeSet::new()),
         SplatChange::Apply(edit) => {
-            let (cloud, map) = apply(cloud, map.as_deref(), edit)?;
-            (Arc::new(cloud), map.map(Arc::new))
+            let (edited, map) = apply(cloud, map.as_deref(), edit)?;
+            let stale = measurements::stale(&request.measurements, cloud, &edited);
+            (Arc::new(edited), map.map(Arc::new), stale)
         }
     };
     let (folder, name, state) = match request.is_edited {
@@ -77,5 +85,5 @@ pub(crate) fn run(request: &RearrangeRequest, known: Option<&str>) -> Result<Rea
         }
     };
     let facts = request.facts.clone().with_edited(&cloud, &request.cameras);
-    Ok(RearrangedScene { cloud, map, folder, name, state, facts })
+    Ok(RearrangedScene { cloud, map, folder, name, state, facts, stale })
 }

@@ -134,6 +134,26 @@ pub(crate) fn length(units: f64, meters_per_unit: Option<f64>) -> String {
     }
 }
 
+/// An area: in m\u{b2}, cm\u{b2} or mm\u{b2} where the length of a unit in meters is known, else in square units.
+pub(crate) fn area(square_units: f64, meters_per_unit: Option<f64>) -> String {
+    let Some(scale) = meters_per_unit else { return format!("{} units\u{b2}", number(square_units)) };
+    match square_units * scale * scale {
+        m if m >= 1.0 => format!("{} m\u{b2}", number(m)),
+        m if m >= 1e-4 => format!("{} cm\u{b2}", number(m * 1e4)),
+        m => format!("{} mm\u{b2}", number(m * 1e6)),
+    }
+}
+
+/// A volume, in the same way.
+pub(crate) fn volume(cubic_units: f64, meters_per_unit: Option<f64>) -> String {
+    let Some(scale) = meters_per_unit else { return format!("{} units\u{b3}", number(cubic_units)) };
+    match cubic_units * scale.powi(3) {
+        m if m >= 0.1 => format!("{} m\u{b3}", number(m)),
+        m if m >= 1e-6 => format!("{} cm\u{b3}", number(m * 1e6)),
+        m => format!("{} mm\u{b3}", number(m * 1e9)),
+    }
+}
+
 /// A number of an axis: at most four significant digits, none of them needless.
 pub(crate) fn tick(v: f64) -> String {
     match v.abs() {
@@ -209,6 +229,16 @@ mod tests {
         assert_eq!([7, 1_000, 1_234_567].map(count), ["7", "1,000", "1,234,567"]);
         assert_eq!([999, 1_500, 2_000_000, 3_500_000_000].map(bytes), ["999 B", "2 kB", "2 MB", "3.5 GB"]);
         assert_eq!([1, 2].map(|n| things(n, "part")), ["1 part", "2 parts"]);
+    }
+
+    #[test]
+    fn areas_and_volumes_have_units_of_their_size() {
+        assert_eq!(area(2.0, None), "2.000 units\u{b2}");
+        let scaled = [1.0, 0.02, 1e-4].map(|side: f64| area(side * side, Some(2.0)));
+        assert_eq!(scaled, ["4.000 m\u{b2}", "16.00 cm\u{b2}", "0.04000 mm\u{b2}"]);
+        let cubes = [1.0, 0.1, 1e-3].map(|side: f64| volume(side * side * side, Some(1.0)));
+        assert_eq!(cubes, ["1.000 m\u{b3}", "1000 cm\u{b3}", "1.000 mm\u{b3}"]);
+        assert_eq!(volume(8.0, None), "8.000 units\u{b3}");
     }
 
     #[test]

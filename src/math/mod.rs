@@ -7,6 +7,7 @@ mod fast_exp;
 mod fast_ln;
 pub(crate) mod finite;
 pub(crate) mod format;
+pub mod geometry;
 pub(crate) mod grid;
 pub(crate) mod lanes;
 pub(crate) mod morton;
@@ -18,6 +19,7 @@ pub mod rotation;
 pub mod sh;
 pub(crate) mod srgb;
 pub mod stats;
+pub(crate) mod ticks;
 pub mod vector;
 
 pub use real::Real;

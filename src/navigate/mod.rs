@@ -4,7 +4,7 @@
 //! In the order of the data: [`occupancy`] from the Gaussians, [`keypoints`] from the cameras, [`graph`]
 //! of both; [`target`] chooses a view, [`navigator`] finds the way to it, [`curve`] rounds it, and
 //! [`approach`] does all of that for an identity; [`flight`] makes poses of frames of it. [`camera_spline`] does the
-//! same for a path that the user has put together.
+//! same for a path that the user has put together, [`turntable`] makes one around an object.
 
 pub(crate) mod approach;
 pub(crate) mod camera_spline;
@@ -20,6 +20,7 @@ mod preference;
 pub mod target;
 #[cfg(test)]
 pub(crate) mod testing;
+pub(crate) mod turntable;
 
 pub(crate) use camera_spline::CameraSpline;
 pub use flight::{CameraTrajectory, FRAMES, Speed};

@@ -17,6 +17,7 @@ pub(crate) mod home_view;
 pub(crate) mod identity;
 pub(crate) mod language;
 pub(crate) mod mask;
+pub mod measurement;
 pub(crate) mod photo;
 pub mod plan;
 pub(crate) mod preparation;
@@ -27,6 +28,7 @@ pub(crate) mod shapes;
 pub(crate) mod support;
 pub(crate) mod text;
 pub(crate) mod undo;
+pub(crate) mod upright_box;
 
 pub use alpha::AlphaUse;
 pub use axes::Axes;

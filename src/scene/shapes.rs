@@ -9,6 +9,7 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use super::support::{Standing, Support};
+use super::upright_box::{UprightBox, upright_axes};
 use super::{Bounds, GaussianCloud, Identities, IdentityId, SemanticMap};
 
 /// Number of points spread evenly over an identity's Gaussians.
@@ -128,15 +129,6 @@ fn directions() -> [DVec3; DIRECTIONS] {
     ALL.map(|d| DVec3::from(d.map(f64::from)).normalize_or_zero())
 }
 
-/// Returns two level unit axes and the unit up direction: the same for every view.
-fn upright_axes(up: DVec3) -> Option<[DVec3; 3]> {
-    let up = up.try_normalize().unwrap_or(DVec3::Z);
-    let axes = [DVec3::X, DVec3::Y, DVec3::Z].into_iter();
-    let level = axes.min_by(|a, b| a.dot(up).abs().total_cmp(&b.dot(up).abs()))?;
-    let first = (level - up * level.dot(up)).try_normalize()?;
-    Some([first, up.cross(first), up])
-}
-
 /// Edges of a thing's own upright box, in scene units.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Extent {
@@ -152,26 +144,8 @@ impl Extent {
     /// Fits the upright box with the smallest footprint. It depends on the points and the up direction alone, never
     /// on a view.
     pub(crate) fn new(points: &[DVec3], up: DVec3) -> Option<Self> {
-        const STEP_DEG: f64 = 3.0;
-        let [first, second, up] = upright_axes(up)?;
-        let flat: Vec<[f64; 3]> = points.iter().map(|p| [p.dot(first), p.dot(second), p.dot(up)]).collect();
-        let length = |values: &mut dyn Iterator<Item = f64>| {
-            let (low, high) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), x| (l.min(x), h.max(x)));
-            high - low
-        };
-        let height = length(&mut flat.iter().map(|p| p[2]));
-        let mut best: Option<[f64; 2]> = None;
-        for i in 0..(90.0 / STEP_DEG) as u32 {
-            let (sin, cos) = (f64::from(i) * STEP_DEG).to_radians().sin_cos();
-            let a = length(&mut flat.iter().map(|p| p[0] * cos + p[1] * sin));
-            let b = length(&mut flat.iter().map(|p| p[1] * cos - p[0] * sin));
-            // The margin keeps rounding errors from changing the choice.
-            if best.is_none_or(|[x, y]| a * b < x * y * (1.0 - 1e-9)) {
-                best = Some([a, b]);
-            }
-        }
-        let [a, b] = best.filter(|_| height.is_finite())?;
-        Some(Self { length: a.max(b), width: a.min(b), height })
+        let [length, width, height] = UprightBox::fit(points, up)?.size();
+        Some(Self { length, width, height })
     }
 
     /// Product of the edges; of a flat thing, nearly its area.

@@ -20,6 +20,7 @@ use super::panes::{
     photos::PhotosPane, phrases::PhrasesPane, report::ReportPane, training::TrainingPane,
 };
 use super::state::{AppState, Tone};
+use super::stored_measurements::StoredMeasurements;
 use super::theme;
 use super::toasts::Toasts;
 use super::viewport::Viewport;
@@ -77,6 +78,7 @@ pub struct App {
     pub(crate) camera: CameraPane,
     /// The conversation with the agent.
     pub(crate) chat: Chat,
+    pub(super) measured: StoredMeasurements,
     pub(super) toasts: Toasts,
     pub(super) actions: Vec<Action>,
     /// Window time of the last frame, s.
@@ -140,6 +142,7 @@ impl App {
             report: ReportPane::default(),
             camera: CameraPane::default(),
             chat: Chat::default(),
+            measured: StoredMeasurements::default(),
             toasts: Toasts::default(),
             last_frame: 0.0,
             traced: 0,

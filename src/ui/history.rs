@@ -12,6 +12,7 @@ use crate::jobs::rearrange::{Placement, SplatEdit};
 use crate::math::format::things;
 use crate::pipeline::semantics::lifting::edit::Edit;
 use crate::pipeline::semantics::query::recipe::QueryConfig;
+use crate::scene::measurement::{Measurement, change_text};
 use crate::scene::undo::UndoHistory;
 use crate::scene::{CameraPath, CropBox, GaussianCloud, Identities, IdentityId, NO_IDENTITY, SemanticMap};
 use crate::worker::ViewMode;
@@ -31,6 +32,7 @@ pub(crate) struct ViewState {
     pub(crate) dim: bool,
     pub(crate) cameras: bool,
     pub(crate) path: CameraPath,
+    pub(crate) measurements: Vec<Measurement>,
     /// Pinned queries in the first and the second view.
     pub(crate) pinned: [Vec<String>; 2],
     /// Recipes of the queries in both views.
@@ -214,6 +216,9 @@ fn described(before: &ViewState, now: &ViewState, all: Option<&Identities>) -> S
         };
         return what.to_owned();
     }
+    if before.measurements != now.measurements {
+        return change_text(&before.measurements, &now.measurements);
+    }
     if let Some((_, now)) = before.modes.iter().zip(now.modes).find(|(before, now)| *before != now) {
         return match now {
             ViewMode::Rgb => "showed RGB".to_owned(),
@@ -314,6 +319,7 @@ mod tests {
             dim: false,
             cameras: true,
             path,
+            measurements: Vec::new(),
             pinned: Default::default(),
             recipes: Default::default(),
         };

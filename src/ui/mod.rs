@@ -31,6 +31,7 @@ pub(crate) mod palette;
 pub(crate) mod panes;
 pub mod select_shape;
 pub(crate) mod state;
+mod stored_measurements;
 mod text_field;
 pub(crate) mod theme;
 pub(crate) mod toasts;

@@ -19,10 +19,11 @@ enum Row {
     Line,
 }
 
-fn rows(all: &Identities, id: IdentityId) -> [Row; 16] {
+fn rows(all: &Identities, id: IdentityId) -> [Row; 17] {
     let plain = |action, name| Row::Do(action, name, None);
     [
         Row::Do(Action::GoToTarget(id, Side::Best), "Go there", Some(Action::GoToSelected)),
+        plain(Action::Turntable(Some(id)), "Turntable"),
         plain(Action::Ask(all.full_name(id)), "Ask for this"),
         Row::Do(Action::Isolate(Some(id)), "Isolate", Some(Action::IsolateSelected)),
         Row::Do(Action::Hide(id), "Hide or show", Some(Action::HideSelected)),

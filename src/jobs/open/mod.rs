@@ -7,7 +7,7 @@ use std::sync::Arc;
 use super::held_out::held_out;
 use super::recent::{self, RunSummary};
 use super::sparse_cloud::sparse_cloud;
-use super::{Folders, JobError, plan};
+use super::{Folders, JobError, measurements, plan};
 use crate::io::labels::Labels;
 use crate::io::scene_files::{CHECKPOINT_FILE, SELECTION_FILE};
 use crate::io::trained::{self, History, SceneCamera};
@@ -15,6 +15,7 @@ use crate::io::{self, Opened, TrainedScene};
 use crate::pipeline::observer::{Observer, Severity};
 use crate::pipeline::train::TrainConfig;
 use crate::render::RenderSettings;
+use crate::scene::measurement::Measurement;
 use crate::scene::plan::used_degree;
 use crate::scene::resource_log::{self, ResourceKind};
 use crate::scene::{Axes, Bounds, Camera, Dataset, GaussianCloud, HomeView, Machine, SceneFacts, SemanticMap};
@@ -217,6 +218,8 @@ pub struct OpenedScene {
     pub(crate) masks: Option<PathBuf>,
     /// Folder in which training keeps its results and checkpoints.
     pub out: PathBuf,
+    /// Measurements that are kept with it.
+    pub measurements: Vec<Measurement>,
     /// The first view.
     pub home: HomeView,
     pub(crate) facts: SceneFacts,
@@ -290,6 +293,7 @@ impl OpenedScene {
             known_held_out,
             trained: true,
             semantics,
+            measurements: scene.folder.as_deref().map_or_else(Vec::new, |folder| measurements::known(folder, observer)),
             out: scene.folder.clone().unwrap_or_default(),
             home,
             can_resume: has_checkpoint,

@@ -104,7 +104,8 @@ fn start_rearrangement(app: &mut App, change: SplatChange, editing: Editing) -> 
     }
     let (cloud, map) = (Arc::clone(&cloud), map.map(|map| Arc::clone(&map)));
     let (facts, path, is_edited) = (app.state.plan.facts.clone(), scene.stored().to_path_buf(), scene.is_edited);
-    let request = RearrangeRequest { path, name: scene.name.clone(), is_edited, cloud, map, change, facts, cameras };
+    let (name, measurements) = (scene.name.clone(), app.viewport.measurements.clone());
+    let request = RearrangeRequest { path, name, is_edited, cloud, map, change, measurements, facts, cameras };
     let workspace = Arc::clone(&app.workspace);
     let change = move |_: &mut dyn Observer| {
         workspace.rearrange(&request).map_err(|e: JobError| Stop::from(e).or_remedy(UNCHANGED))
@@ -112,6 +113,7 @@ fn start_rearrangement(app: &mut App, change: SplatChange, editing: Editing) -> 
     app.editing = Some(editing);
     let started = app.start_in_scene(JobInfo::short(title), change, |app, done| {
         if let Some(done) = done {
+            app.viewport.measurements.retain(|m| !done.stale.contains(&m.id));
             let cloud = app.state.rearranged(done);
             app.viewport.set_cloud(cloud);
         }
@@ -190,7 +192,7 @@ fn go_in_history(app: &mut App, redo: bool) {
 
 /// Shows an earlier or later state of the view.
 fn show_state(app: &mut App, view: ViewState) {
-    let ViewState { hidden, crop, modes, split, dim, cameras, path, pinned, recipes } = view;
+    let ViewState { hidden, crop, modes, split, dim, cameras, path, measurements, pinned, recipes } = view;
     if app.viewport.visibility.hidden() != &hidden {
         app.viewport.visibility.set_hidden(hidden);
     }
@@ -198,6 +200,7 @@ fn show_state(app: &mut App, view: ViewState) {
     ([app.layout.mode, app.layout.second_mode], app.layout.cameras) = (modes, cameras);
     (app.layout.split_view, app.layout.dim) = (split, dim);
     app.camera.set_path(path);
+    app.viewport.measurements = measurements;
     if let Some(map) = app.state.semantics.clone() {
         app.viewport.queries.set_recipes(&recipes, &map);
         app.viewport.queries.pin_only(&pinned, &map);
@@ -215,6 +218,7 @@ pub(in crate::ui) fn snapshot(app: &App) -> EditSnapshot {
         dim: layout.dim,
         cameras: layout.cameras,
         path: app.camera.path.clone(),
+        measurements: viewport.measurements.clone(),
         pinned: viewport.queries.pinned_texts(),
         recipes: viewport.queries.recipes(),
     };
@@ -223,8 +227,8 @@ pub(in crate::ui) fn snapshot(app: &App) -> EditSnapshot {
     EditSnapshot { scene: app.state.scene_number, map, cloud, view }
 }
 
-/// Records changes since the last call in the history, unless objects and parts are about to change. Camera path
-/// and crop box only `at_rest`: without a drag or typing in progress.
+/// Records changes since the last call in the history, unless objects and parts are about to change. Camera path,
+/// crop box and measurements only `at_rest`: without a drag or typing in progress.
 pub(in crate::ui) fn settle(app: &mut App, at_rest: bool) {
     if app.editing.is_some() {
         return;
@@ -233,6 +237,7 @@ pub(in crate::ui) fn settle(app: &mut App, at_rest: bool) {
     let before = app.state.changes.now().filter(|before| before.scene == now.scene);
     if let Some(before) = before.filter(|_| !at_rest) {
         (now.view.path, now.view.crop) = (before.view.path.clone(), before.view.crop);
+        now.view.measurements.clone_from(&before.view.measurements);
     }
     let shown = before.is_some_and(|before| before.view.hidden != now.view.hidden);
     let Some(what) = app.state.changes.settle(&now, None) else { return };

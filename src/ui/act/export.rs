@@ -21,7 +21,7 @@ use crate::ui::state::Tone;
 use crate::worker::{Failure, JobInfo};
 
 /// Name of the scene for new files.
-fn scene_name(app: &App) -> String {
+pub(super) fn scene_name(app: &App) -> String {
     app.state.scene.as_ref().map_or_else(|| "scene".to_owned(), |s| s.name.clone())
 }
 

@@ -11,8 +11,9 @@ use crate::jobs::JobError;
 use crate::jobs::go_to::{self, ApproachRequest, Approached};
 use crate::navigate::FRAMES;
 use crate::navigate::target::{Side, ViewPreference};
+use crate::navigate::turntable;
 use crate::pipeline::observer::Observer;
-use crate::scene::{CropBox, Identities, IdentityId, NO_IDENTITY, SemanticMap};
+use crate::scene::{CameraPath, CropBox, Identities, IdentityId, NO_IDENTITY, SemanticMap};
 use crate::ui::actions::{Face, Pane};
 use crate::ui::app::App;
 use crate::ui::color_by::ColorBy;
@@ -302,7 +303,30 @@ pub(in crate::ui) fn step_in_time(app: &mut App, ctx: &Context, frames: f64) {
 }
 
 pub(in crate::ui) fn add_key(app: &mut App) {
-    app.camera.record(&app.viewport.pose());
+    if let (number, Some(time)) = app.camera.record(&app.viewport.pose()) {
+        app.state.toast(Tone::Info, format!("Inserted keyframe {number} at the playhead, {time:.2} s."));
+    }
+    app.layout.show(Pane::Camera);
+}
+
+/// Replaces the camera path by a turn around an identity, or else the selection, or else the scene, and plays it.
+pub(in crate::ui) fn turntable(app: &mut App, id: Option<IdentityId>) {
+    let Some(scene) = app.state.scene.clone() else {
+        return app.state.toast(Tone::Info, "There is nothing to turn around: open a scene first.");
+    };
+    let of = id.or_else(|| chosen_identity(app));
+    if of.is_some_and(|id| is_empty(app, id)) {
+        return;
+    }
+    let bounds = of.and_then(|id| app.viewport.bounds_of(id, &app.state)).unwrap_or(scene.home.bounds);
+    let Some(path) = turntable::turntable(&app.viewport.pose(), &bounds, app.viewport.up(&scene)) else {
+        return app.state.toast(Tone::Warning, "There is no way around it from here: move the view first.");
+    };
+    if !app.camera.path.keys.is_empty() {
+        app.state.toast(Tone::Info, "The turntable replaces the camera path; undo brings it back.");
+    }
+    app.viewport.turn_about(bounds.center());
+    app.camera.repeat(CameraPath { fps: app.camera.path.fps, ..path });
     app.layout.show(Pane::Camera);
 }
 

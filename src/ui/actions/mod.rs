@@ -166,8 +166,13 @@ impl Action {
     pub(crate) fn all() -> Vec<Self> {
         let mut all = Self::plain();
         // These need a tool in use.
-        all.retain(|a| !matches!(a, Self::AddPainted | Self::ApplyTransform));
-        all.extend([Self::Isolate(None), Self::SegmentNew(Some(NO_IDENTITY)), Self::SetCrop(None)]);
+        all.retain(|a| !matches!(a, Self::AddPainted | Self::ApplyTransform | Self::KeepMeasurement));
+        all.extend([
+            Self::Isolate(None),
+            Self::SegmentNew(Some(NO_IDENTITY)),
+            Self::SetCrop(None),
+            Self::Turntable(None),
+        ]);
         all.extend(ViewMode::VARIANTS.iter().map(|mode| Self::Show(*mode)));
         all.extend(Pane::VARIANTS.iter().map(|pane| Self::ShowPane(*pane)));
         all.extend(THEMES.map(Self::UseTheme));

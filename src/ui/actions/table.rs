@@ -85,7 +85,11 @@ macro_rules! action_table {
             StepBack: "Previous frame", "Move back along the path by one frame.", "," => view::step_in_time(app, ctx, -1.0);
             StepForward: "Next frame", "Move forward along the path by one frame.", "."
                 => view::step_in_time(app, ctx, 1.0);
-            AddKey: "Add keyframe", "Add the current view to the camera path.", "K" => view::add_key(app);
+            AddKey: "Add keyframe", "Add the current view to the camera path: at the playhead, or else at the end.", "K"
+                => view::add_key(app);
+            Turntable(of: Option<IdentityId>): "Turntable around the selection",
+                "Replace the camera path by a turn around the selection, or else the scene, and play it."
+                => view::turntable(app, of);
             OpenPath: "Open a camera path\u{2026}", "A path of this program, or of nerfstudio's viewer."
                 => open::choose_path(app);
             SavePath: "Save the camera path\u{2026}", "As .json; for nerfstudio, end its name in .nerfstudio.json."
@@ -182,8 +186,11 @@ macro_rules! action_table {
                 => view::turn_up(app, ctx, axis.vector());
             SetUp(up: DVec3): format!("Make ({:.2}, {:.2}, {:.2}) the up direction", up.x, up.y, up.z),
                 "Use the picked plane as the floor." => view::turn_up(app, ctx, up);
-            Measure: "Measure a distance", "Click two points on surfaces; set the scale from a known length.", "M"
+            Measure: "Measure", "Lengths, angles, areas and boxes of objects; the scale from a known length, the floor from a plane.", "M"
                 => app.viewport.measure(&app.state);
+            KeepMeasurement: "Keep the measurement", "Give it a name and store it with the scene." => measure::keep(app);
+            ExportMeasurements: "Export measurements\u{2026}", "As a .csv table, or as .json with their points."
+                => measure::write(app);
             Crop: "Crop box", "Show only the Gaussians in a box: drag its faces or type its corners.", "B"
                 => app.viewport.crop(&app.state);
             SetCrop(crop: Option<CropBox>): if crop.is_some() { "Crop the view" } else { "Remove the crop box" },

@@ -2,12 +2,13 @@
 
 mod keys;
 pub(crate) mod player;
+mod recording;
 mod timeline;
 
 use std::collections::VecDeque;
 use std::path::Path;
 
-use egui::{Align, Button, Checkbox, ComboBox, DragValue, Layout, RichText, Slider, Ui, vec2};
+use egui::{Align, Button, Checkbox, ComboBox, DragValue, Layout, RichText, ScrollArea, Slider, Ui, vec2};
 
 use self::player::{Clip, Player};
 use super::ctx::Ctx;
@@ -29,6 +30,8 @@ pub(crate) struct CameraPane {
     pub(crate) player: Player,
     /// Index of the chosen keyframe.
     selected: Option<usize>,
+    /// True if the table has the columns that are seldom needed.
+    shows_more: bool,
     /// Path and speed that the player's spline was last made of.
     loaded: Option<(CameraPath, Speed)>,
     /// Height of videos, px.
@@ -60,6 +63,7 @@ impl Default for CameraPane {
             speed: Speed::Constant,
             player: Player::default(),
             selected: None,
+            shows_more: false,
             loaded: None,
             video_height: 720,
             quality: 80,
@@ -134,12 +138,27 @@ impl CameraPane {
         self.player.seek(time)
     }
 
-    /// Inserts the current view as a keyframe after the chosen one.
-    pub(crate) fn record(&mut self, pose: &Pose) {
-        let place = self.selected.map_or(self.path.keys.len(), |i| (i + 1).min(self.path.keys.len()));
-        self.path.keys.insert(place, pose.key());
+    /// Adds the current view as a keyframe: at the playhead if it stands between two keys, else at the end. Returns its
+    /// number, and its time if it was inserted.
+    pub(crate) fn record(&mut self, pose: &Pose) -> (usize, Option<f64>) {
+        self.keep_up();
+        let (key, time) = (pose.key(), self.player.time);
+        let inserted = match self.player.clip() {
+            Some(Clip::Path(spline)) => recording::insert(&mut self.path, &spline.times, time, &key),
+            _ => None,
+        };
+        let place = inserted.unwrap_or_else(|| recording::append(&mut self.path, key));
         self.selected = Some(place);
         self.put_path_in();
+        (place + 1, inserted.map(|_| time))
+    }
+
+    /// Replaces the path by one that is repeated, and plays it.
+    pub(crate) fn repeat(&mut self, path: CameraPath) {
+        self.next.clear();
+        self.player.replace(None);
+        self.open(path);
+        (self.player.looped, self.player.playing) = (true, true);
     }
 
     /// Replaces the path by one read from a file.
@@ -260,10 +279,12 @@ impl CameraPane {
         self.put_path_in();
     }
 
-    fn path_tools(&mut self, ui: &mut Ui, eye: &Pose, cx: &mut Ctx<'_>) {
-        let tip = format!("{}  {}", Action::AddKey.tooltip(), super::keys::label(ui.ctx(), &Action::AddKey));
-        if ui.button("Add keyframe").on_hover_text(tip).clicked() {
-            self.record(eye);
+    fn path_tools(&mut self, ui: &mut Ui, cx: &mut Ctx<'_>) {
+        for (text, action) in [("Add keyframe", Action::AddKey), ("Turntable", Action::Turntable(None))] {
+            let tip = format!("{}  {}", action.tooltip(), super::keys::label(ui.ctx(), &action));
+            if ui.button(text).on_hover_text(tip.trim_end()).clicked() {
+                cx.ask(action);
+            }
         }
         for (text, action, enabled) in
             [("Open\u{2026}", Action::OpenPath, true), ("Save\u{2026}", Action::SavePath, !self.path.keys.is_empty())]
@@ -273,23 +294,26 @@ impl CameraPane {
                 cx.ask(action);
             }
         }
+        let has_keys = !self.path.keys.is_empty();
+        let duration = ui.label("Duration").id;
+        let seconds = DragValue::new(&mut self.path.seconds).range(0.1..=3600.0).speed(0.05).suffix(" s");
+        ui.add_enabled(has_keys, seconds).labelled_by(duration);
+        ui.add_enabled(has_keys, Checkbox::new(&mut self.path.closed, "Closed loop"))
+            .on_hover_text("Continue from the last keyframe to the first.");
+        let mut eased = self.speed == Speed::Eased;
+        ui.add_enabled(has_keys, Checkbox::new(&mut eased, "Ease in/out"))
+            .on_hover_text("Start and stop smoothly, also at waits.");
+        self.speed = if eased { Speed::Eased } else { Speed::Constant };
+    }
+
+    /// Draws the choice of what is shown of the path.
+    fn shown(&mut self, ui: &mut Ui, cx: &Ctx<'_>) {
         ui.add_enabled(cx.state.explored.is_some(), Checkbox::new(&mut self.show_reach, "Show reach"))
             .on_hover_text("Mark the places that the camera can go to: green; red ones cannot be reached from here.")
             .on_disabled_hover_text("Known once the camera has gone to an object.");
-    }
-
-    fn timing(&mut self, ui: &mut Ui) {
-        if self.path.keys.is_empty() {
-            ui.disable();
-        }
-        let duration = ui.label("Duration").id;
-        ui.add(DragValue::new(&mut self.path.seconds).range(0.1..=3600.0).speed(0.05).suffix(" s"))
-            .labelled_by(duration);
-        ui.checkbox(&mut self.path.closed, "Closed loop")
-            .on_hover_text("Continue from the last keyframe to the first.");
-        let mut eased = self.speed == Speed::Eased;
-        ui.checkbox(&mut eased, "Ease in/out").on_hover_text("Start and stop smoothly, also at waits.");
-        self.speed = if eased { Speed::Eased } else { Speed::Constant };
+        ui.add_enabled(!self.path.keys.is_empty(), Checkbox::new(&mut self.shows_more, "More columns"))
+            .on_hover_text("Field of view, roll and wait of each keyframe.")
+            .on_disabled_hover_text(NO_KEYS);
     }
 
     fn video_tools(&mut self, ui: &mut Ui, cx: &mut Ctx<'_>) {
@@ -325,22 +349,23 @@ impl PaneContents for CameraPane {
     fn ui(&mut self, ui: &mut Ui, cx: &mut Ctx<'_>, view: &mut Viewport) {
         let eye = view.pose();
         self.keep_up();
-        ui.horizontal_wrapped(|ui| self.controls(ui, cx));
+        ui.horizontal_wrapped(|ui| {
+            self.controls(ui, cx);
+            self.shown(ui, cx);
+        });
         ui.add_space(2.0);
         let mut wanted = timeline::show(ui, self);
         ui.add_space(2.0);
-        row(ui, "Path", |ui| self.path_tools(ui, &eye, cx));
-        row(ui, "Timing", |ui| self.timing(ui));
-        row(ui, "Video", |ui| self.video_tools(ui, cx));
-        if self.path.keys.is_empty() {
-            ui.add_space(4.0);
-            ui.weak(
-                "No keyframes yet. Add the current view (K), open a path, or go to an object and convert the \
-                 flight.",
-            );
-        } else {
-            wanted = keys::show(ui, self, &eye).or(wanted);
-        }
+        ScrollArea::vertical().auto_shrink([false, false]).show(ui, |ui| {
+            row(ui, "Path", |ui| self.path_tools(ui, cx));
+            row(ui, "Video", |ui| self.video_tools(ui, cx));
+            if self.path.keys.is_empty() {
+                ui.add_space(4.0);
+                ui.weak("No keyframes yet. Add the current view (K), open a path, or convert the flight to an object.");
+            } else {
+                wanted = keys::show(ui, self, &eye).or(wanted);
+            }
+        });
         if let Some(pose) = wanted {
             view.stand(&pose, cx.state, ui.input(|i| i.time));
         }

@@ -5,6 +5,7 @@ use egui::{Align2, CursorIcon, FontId, Rect, Sense, Stroke, Ui, pos2, vec2};
 use super::super::theme;
 use super::CameraPane;
 use super::player::Clip;
+use crate::math::ticks::round_step;
 use crate::navigate::Pose;
 
 /// Height of the timeline, points.
@@ -94,22 +95,24 @@ pub(crate) fn show(ui: &mut Ui, pane: &mut CameraPane) -> Option<Pose> {
     wanted
 }
 
-/// Ticks below the track, with seconds where they fit.
+/// Ticks below the track at round times, with seconds where they fit.
 fn ticks(painter: &egui::Painter, line: Rect, seconds: f64, x: impl Fn(f64) -> f32) {
-    const ROOM: f32 = 44.0;
-    let step = [0.1, 0.5, 1.0, 5.0, 10.0, 60.0, 300.0].into_iter().find(|s| seconds / s <= 24.0).unwrap_or(900.0);
-    let every = ((ROOM / (x(step) - x(0.0)).max(1.0)).ceil() as usize).max(1);
-    for i in 0..=(seconds / step) as usize {
-        let (at, time) = (x(i as f64 * step), i as f64 * step);
-        let has_number = i.is_multiple_of(every);
+    /// Room of a number, points.
+    const ROOM: f64 = 52.0;
+    let step = round_step((seconds * ROOM / f64::from(line.width().max(1.0))).max(0.1));
+    // A fifth of 1 and of 5 is round, as is a quarter of 2.
+    let parts: u32 = if round_step(step / 5.0) < step / 4.5 { 5 } else { 4 };
+    let small = step / f64::from(parts);
+    for i in 0..=(seconds / small + 1e-6) as u32 {
+        let (time, has_number) = (f64::from(i) * small, i.is_multiple_of(parts));
         let stroke = Stroke::new(1.0, theme::weak().gamma_multiply(if has_number { 0.9 } else { 0.4 }));
-        painter.line_segment([pos2(at, line.top() + 24.0), pos2(at, line.top() + 28.0)], stroke);
+        painter.line_segment([pos2(x(time), line.top() + 24.0), pos2(x(time), line.top() + 28.0)], stroke);
         if has_number {
             let text = if step < 1.0 { format!("{time:.1} s") } else { format!("{time:.0} s") };
             // The first and the last number stay within the track.
             let galley = painter.layout_no_wrap(text, FontId::proportional(10.5), theme::weak());
             let half = 0.5 * galley.size().x;
-            let left = at.clamp(line.left() - 8.0 + half, line.right() + 8.0 - half) - half;
+            let left = x(time).clamp(line.left() - 8.0 + half, line.right() + 8.0 - half) - half;
             painter.galley(pos2(left, line.top() + 27.0), galley, theme::weak());
         }
     }

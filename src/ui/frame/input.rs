@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use egui::Context;
+use egui::{Context, Key, Modifiers};
 
 use crate::measure::is_report;
 use crate::ui::act::{act, edits, query};
@@ -21,11 +21,19 @@ pub(super) fn take(app: &mut App, ctx: &Context) {
         || app.dialogs.is_own_open();
     // An open menu takes the keys; Escape closes only the menu.
     let has_menu = egui::Popup::is_any_open(ctx);
-    if has_menu && ctx.input_mut(|i| i.consume_key(egui::Modifiers::NONE, egui::Key::Escape)) {
+    if has_menu && ctx.input_mut(|i| i.consume_key(Modifiers::NONE, Key::Escape)) {
         egui::Popup::close_all(ctx);
     }
     query::follow_vain_query(app, ctx);
     if !app.palette.is_open() && !has_dialog && !app.sheet && !has_menu {
+        // While something is measured, Enter keeps it.
+        let keeps = !keys::is_typing(ctx) && app.viewport.is_measuring();
+        if keeps
+            && ctx.memory(|m| m.focused()).is_none()
+            && ctx.input_mut(|i| i.consume_key(Modifiers::NONE, Key::Enter))
+        {
+            app.actions.push(Action::KeepMeasurement);
+        }
         for action in keys::pressed(ctx) {
             if keys::opens_field(&action) {
                 // Before drawing: text typed in this frame belongs to the field.

@@ -5,7 +5,7 @@ mod input;
 
 use egui::Ui;
 
-use super::act::{act, edits, query, remote, view, window};
+use super::act::{act, edits, measure, query, remote, view, window};
 use super::actions::Pane;
 use super::app::App;
 use super::state::Tone;
@@ -30,7 +30,11 @@ impl eframe::App for App {
             act(action, self, &ctx);
             ctx.request_repaint();
         }
-        edits::settle(self, !ctx.input(|i| i.pointer.any_down()) && !ctx.text_edit_focused());
+        let at_rest = !ctx.input(|i| i.pointer.any_down()) && !ctx.text_edit_focused();
+        edits::settle(self, at_rest);
+        if at_rest {
+            measure::keep_up(self);
+        }
     }
 
     fn save(&mut self, storage: &mut dyn eframe::Storage) {

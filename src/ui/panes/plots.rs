@@ -1,12 +1,21 @@
 //! The plot of training: PSNR or loss against seconds or steps.
 
 use egui::{Slider, Ui, Vec2b};
-use egui_plot::{HoverPosition, Legend, Line, LineStyle, MarkerShape, Plot, PlotPoints, Points};
+use egui_plot::{GridMark, HoverPosition, Legend, Line, LineStyle, MarkerShape, Plot, PlotPoints, Points};
 
 use super::super::layout::{PlotAxis, PlotQuantity, PlotSettings};
 use super::super::state::TrainHistory;
 use super::super::theme;
+use crate::math::format;
+use crate::math::ticks::round_step;
 use crate::pipeline::observer::{Evaluation, StepMetrics};
+
+/// Least width of the vertical axis, points.
+const Y_AXIS_PT: f32 = 34.0;
+/// Least distance of the numbers of the horizontal axis, points.
+const MARK_PT: f64 = 80.0;
+/// Width of a letter of an axis, points.
+const LETTER_PT: f64 = 8.0;
 
 /// PSNR over seconds of another training, with its name.
 pub(crate) type PsnrCurve = (String, Vec<[f64; 2]>);
@@ -52,7 +61,7 @@ pub(crate) fn show(
         Line::new(name, smooth(points)).color(theme::weak()).width(1.2).style(LineStyle::dashed_loose())
     };
     if settings.quantity == PlotQuantity::Loss {
-        let loss_plot = plot("loss", if log { "log10 loss" } else { "Loss" }, *axis);
+        let loss_plot = plot(ui, "loss", if log { "log10 loss" } else { "Loss" }, *axis);
         let loss_plot = match log {
             true => loss_plot.y_axis_formatter(|mark, _| format!("{:.2e}", 10_f64.powf(mark.value))),
             false => loss_plot.include_y(0.0),
@@ -66,7 +75,7 @@ pub(crate) fn show(
         loss_plot.response.accessible_name("Plot of the loss");
         return;
     }
-    let psnr_plot = plot("psnr", "PSNR (dB)", *axis)
+    let psnr_plot = plot(ui, "psnr", "PSNR (dB)", *axis)
         .legend(Legend::default().position(egui_plot::Corner::RightBottom).background_alpha(0.5))
         .show(ui, |p| {
             let colors = [theme::warning(), theme::good()].into_iter().cycle();
@@ -96,8 +105,9 @@ pub(crate) fn show(
     psnr_plot.response.accessible_name("Plot of PSNR");
 }
 
-fn plot(name: &'static str, quantity: &'static str, axis: PlotAxis) -> Plot<'static> {
+fn plot(ui: &Ui, name: &'static str, quantity: &'static str, axis: PlotAxis) -> Plot<'static> {
     let unit = if axis == PlotAxis::Seconds { "s" } else { "steps" };
+    let width = f64::from(ui.available_width() - Y_AXIS_PT).max(1.0);
     Plot::new(name)
         .height(180.0)
         .show_background(false)
@@ -107,14 +117,27 @@ fn plot(name: &'static str, quantity: &'static str, axis: PlotAxis) -> Plot<'sta
         .include_x(0.0)
         .allow_boxed_zoom(false)
         .set_margin_fraction(egui::vec2(0.02, 0.08))
-        .y_axis_min_width(34.0)
-        .x_axis_formatter(move |mark, _| format!("{} {unit}", mark.value))
+        .y_axis_min_width(Y_AXIS_PT)
+        .x_grid_spacer(move |grid| round_marks(grid.bounds.into(), width))
+        .x_axis_formatter(move |mark, range| {
+            let text = format!("{} {unit}", format::tick(mark.value));
+            let to_border = (range.end() - mark.value) / (range.end() - range.start()) * width;
+            // A number that the border would cut is left out.
+            if to_border < 0.5 * LETTER_PT * text.len() as f64 { String::new() } else { text }
+        })
         .label_formatter(move |at| match at {
             HoverPosition::NearDataPoint { plot_name, position, .. } => {
                 Some(format!("{plot_name}\n{quantity} {:.4}\n{:.1} {unit}", position.y, position.x))
             }
             HoverPosition::Elsewhere { .. } => None,
         })
+}
+
+/// Marks of the horizontal axis: round values, far enough apart for their numbers.
+fn round_marks([from, to]: [f64; 2], width: f64) -> Vec<GridMark> {
+    let step_size = round_step((to - from) * MARK_PT / width);
+    let (first, last) = ((from / step_size).ceil() as i64, (to / step_size).floor() as i64);
+    (first..=last).take(200).map(|i| GridMark { value: i as f64 * step_size, step_size }).collect()
 }
 
 fn finite(p: &[f64; 2]) -> bool {
@@ -136,6 +159,16 @@ fn smooth(points: &[[f64; 2]], percent: f32) -> PlotPoints<'static> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn an_axis_has_several_round_marks_at_any_length() {
+        for seconds in [0.3, 9.0, 75.0, 100.0, 4000.0] {
+            let marks = round_marks([-0.02 * seconds, 1.02 * seconds], 300.0);
+            assert!((2..=4).contains(&marks.len()) && marks[0].value == 0.0, "{seconds}: {marks:?}");
+        }
+        // Control: in a narrow plot there is room for fewer.
+        assert!(round_marks([0.0, 75.0], 120.0).len() < round_marks([0.0, 75.0], 600.0).len());
+    }
 
     #[test]
     fn smoothing_is_a_running_mean_and_none_changes_nothing() {

@@ -324,7 +324,7 @@ impl AppState {
 
     /// Shows edited Gaussians, which continue in another folder as the same scene; returns them.
     pub(crate) fn rearranged(&mut self, done: RearrangedScene) -> Option<Arc<GaussianCloud>> {
-        let RearrangedScene { cloud, map, folder, name, state, facts } = done;
+        let RearrangedScene { cloud, map, folder, name, state, facts, stale: _ } = done;
         let before = self.scene.take()?;
         if !before.is_edited {
             let text = format!("Edits go into {}; {} stays as it is.", folder.display(), before.name);

@@ -21,7 +21,7 @@ use crate::jobs::rearrange::Arrangement;
 use crate::jobs::select::SelectFor;
 use crate::navigate::Pose;
 use crate::pipeline::semantics::lifting::edit::Edit;
-use crate::scene::{CropBox, IdentityId, NO_IDENTITY};
+use crate::scene::{Bounds, CropBox, IdentityId, NO_IDENTITY};
 use crate::ui::actions::Face;
 use crate::ui::select_shape::SelectShape;
 use crate::worker::Tasks;
@@ -35,6 +35,11 @@ impl Viewport {
         let selected = self.parts().1.selected_bounds(state.semantics.as_ref());
         self.eye.frame(selected.as_ref().unwrap_or(&scene.home.bounds));
         self.moved_at = now;
+    }
+
+    /// Bounds of an identity without outliers, if it has Gaussians.
+    pub(crate) fn bounds_of(&mut self, id: IdentityId, state: &AppState) -> Option<Bounds> {
+        self.marks.bounds(self.cloud.as_ref()?, state.semantics.as_ref()?, id)
     }
 
     /// Goes to the first view of the scene.
@@ -139,8 +144,21 @@ impl Viewport {
 
     /// Begins or ends measuring.
     pub(crate) fn measure(&mut self, state: &AppState) {
-        let in_use = matches!(self.tool, Some(Tool::Ruler(_)));
+        let in_use = self.is_measuring();
         self.toggle(in_use, state, |_, _| Tool::Ruler(Ruler::default()));
+    }
+
+    /// True if the ruler is in use.
+    pub(crate) fn is_measuring(&self) -> bool {
+        matches!(self.tool, Some(Tool::Ruler(_)))
+    }
+
+    /// Keeps what the ruler has measured. Returns false if there is nothing to keep.
+    pub(crate) fn take_measurement(&mut self, state: &AppState) -> bool {
+        let (tool, rest) = self.parts();
+        let Some(Tool::Ruler(ruler)) = tool else { return false };
+        let made = ruler.take(&rest, state);
+        made.map(|made| rest.measurements.push(made)).is_some()
     }
 
     /// Begins or ends the edit of the crop box; there is one from then on.

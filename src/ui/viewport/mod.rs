@@ -8,6 +8,7 @@ mod frusta;
 mod input;
 mod legend;
 mod marks;
+mod measured;
 mod outline;
 mod overlay;
 pub(crate) mod overrides;
@@ -43,6 +44,7 @@ use super::state::{AppState, Tone};
 use crate::jobs::OpenedScene;
 use crate::navigate::Pose;
 use crate::render::GpuError;
+use crate::scene::measurement::Measurement;
 use crate::scene::{Camera, GaussianCloud, PhotoPixels};
 use crate::worker::view::{RenderThread, ViewPicture};
 use crate::worker::{CloudSnapshot, Repaint, Tasks, Versioned};
@@ -72,6 +74,8 @@ pub struct Viewport {
     /// Hovered and selected identity.
     pub picking: Picking,
     marks: Marks,
+    /// Measurements of the scene.
+    pub measurements: Vec<Measurement>,
     /// The tool in use.
     tool: Option<Tool>,
     /// Preparation for selections in this scene.
@@ -100,6 +104,7 @@ impl Viewport {
             visibility: Visibility::default(),
             picking: Picking::default(),
             marks: Marks::default(),
+            measurements: Vec::new(),
             tool: None,
             preparation: SelectionPreparation::default(),
             overrides: RenderOverrides::default(),
@@ -185,6 +190,11 @@ impl Viewport {
         self.preparation.times()
     }
 
+    /// True if it shows the scene of this number.
+    pub(crate) fn is_of(&self, scene_number: u64) -> bool {
+        self.scene == scene_number
+    }
+
     fn has_scene(&self) -> bool {
         self.scene > 0
     }
@@ -202,6 +212,7 @@ impl Viewport {
             self.queries.clear();
             self.visibility = Visibility::default();
             self.picking = Picking::default();
+            self.measurements.clone_from(&scene.measurements);
             self.tool = None;
             self.overrides = RenderOverrides::default();
             self.eye = Eye::home(&scene.home, None);
@@ -235,8 +246,22 @@ impl Viewport {
 
     fn parts(&mut self) -> (&mut Option<Tool>, ToolScene<'_>) {
         let (pose, ticket) = (self.pose(), self.requests.ticket());
-        let Self { display, eye, cloud, visibility, queries, picking, marks, tool, preparation, .. } = self;
+        let Self { display, eye, cloud, visibility, queries, picking, marks, measurements, tool, preparation, .. } =
+            self;
         let cloud = cloud.as_ref();
-        (tool, ToolScene { display, eye, pose, cloud, visibility, queries, picking, marks, preparation, ticket })
+        let rest = ToolScene {
+            display,
+            eye,
+            pose,
+            cloud,
+            visibility,
+            queries,
+            picking,
+            marks,
+            measurements,
+            preparation,
+            ticket,
+        };
+        (tool, rest)
     }
 }

@@ -4,6 +4,7 @@ use egui::{Rect, Response, Sense, Ui};
 
 use super::input::SteeredView;
 use super::marks::MarkedScene;
+use super::measured::{self, DrawnMeasurement};
 use super::overlay::ViewCards;
 use super::photo::PhotoView;
 use super::query::SearchedScene;
@@ -160,6 +161,10 @@ impl Viewport {
             if let Some((tool, mut rest)) = self.tool_in_use() {
                 tool.paint(ui, area, &mut rest, cx);
             }
+            // A path that plays is shown as a video of it would be.
+            if !area.is_other && !route.is_some_and(|route| route.plays) {
+                self.show_measurements(ui, area, cx);
+            }
             let searched = state.semantics.as_ref().zip(self.cloud.as_ref()).filter(|_| !area.is_other);
             if let Some((semantics, cloud)) = searched.filter(|_| picks) {
                 if let Some(maps) = self.queries.shown_maps() {
@@ -195,6 +200,19 @@ impl Viewport {
             }
         }
         works_in
+    }
+
+    /// Draws the kept measurements, and the one that is being made.
+    fn show_measurements(&mut self, ui: &Ui, area: ViewArea, cx: &Ctx<'_>) {
+        let meters = cx.state.scene.as_ref().and_then(|scene| scene.meters_per_unit());
+        let (tool, rest) = self.parts();
+        let new = match tool {
+            Some(Tool::Ruler(ruler)) => Some(ruler.drawn(&rest, cx.state)),
+            _ => None,
+        };
+        let kept = rest.measurements.iter().filter(|m| !m.hidden).map(|m| DrawnMeasurement::kept(m, meters));
+        let all: Vec<DrawnMeasurement> = new.into_iter().chain(kept).collect();
+        measured::show(ui, area.shown, &rest.camera(area.shown), &all, meters);
     }
 
     /// Requests a new frame if anything has changed.

@@ -7,6 +7,7 @@ mod edits;
 mod hands;
 mod kept;
 mod keyboard;
+mod measuring;
 mod objects;
 mod panes;
 mod phrases;

@@ -28,6 +28,7 @@ use super::query::Queries;
 use super::split::ViewArea;
 use super::visible::Visibility;
 use crate::navigate::Pose;
+use crate::scene::measurement::Measurement;
 use crate::scene::{Bounds, Camera, GaussianCloud, SemanticMap};
 use crate::ui::ctx::Ctx;
 use crate::ui::state::AppState;
@@ -73,6 +74,8 @@ pub(super) struct ToolScene<'a> {
     pub(super) queries: &'a mut Queries,
     pub(super) picking: &'a Picking,
     pub(super) marks: &'a mut Marks,
+    /// Measurements of the scene.
+    pub(super) measurements: &'a mut Vec<Measurement>,
     /// Preparation for selections in this scene.
     pub(super) preparation: &'a mut SelectionPreparation,
     /// Ticket of the newest request for a frame.

@@ -1,58 +1,166 @@
-//! Measuring in the view: clicks put points on surfaces. Two give a distance, from which the scene's scale can be set;
-//! three give a plane, which can be made the floor.
+//! Measuring in the view: clicks put points on surfaces, which make a length, an angle or an area; of a selected object
+//! the upright box is measured. A length sets the scene's scale, an area the floor.
 
-use egui::{Align2, Area, Color32, FontId, Id, Order, Pos2, Rect, Response, RichText, Stroke, TextEdit, Ui, vec2};
+use egui::{Button, Key, Pos2, Response, RichText, ScrollArea, TextEdit, Ui};
 use glam::{DVec2, DVec3};
 
+use super::super::measured::DrawnMeasurement;
 use super::super::split::ViewArea;
-use super::{CardPlaces, ToolScene, ViewTool};
+use super::{CardPlaces, ToolScene, ViewTool, bottom_card};
 use crate::math::format;
+use crate::math::geometry::GeometryFault;
+use crate::scene::measurement::{MeasuredValue, Measurement, MeasurementKind, free_name};
+use crate::scene::upright_box::UprightBox;
+use crate::scene::{SemanticMap, text};
 use crate::ui::actions::Action;
 use crate::ui::ctx::Ctx;
-use crate::ui::theme;
+use crate::ui::state::AppState;
+use crate::ui::{keys, theme};
+use crate::worker::Versioned;
 
-/// Largest number of points; the next click begins anew.
-const MOST: usize = 3;
+/// Height of the list of kept measurements, points.
+const LIST_PT: f32 = 96.0;
 
-/// The points, and the text typed beside them.
-#[derive(Clone, Debug, Default)]
+/// The points so far, and the text typed beside them.
+#[derive(Clone, Debug)]
 pub(crate) struct Ruler {
+    kind: MeasurementKind,
     points: Vec<DVec3>,
-    /// The true length of the distance, as typed.
+    /// The true length, as typed.
     known: String,
+    /// True if the last click met no surface.
+    missed: bool,
+}
+
+impl Default for Ruler {
+    fn default() -> Self {
+        Self { kind: MeasurementKind::Length, points: Vec::new(), known: String::new(), missed: false }
+    }
 }
 
 impl Ruler {
     fn put(&mut self, point: DVec3) {
-        if self.points.len() == MOST {
+        if self.points.len() >= self.kind.points().1 {
             self.points.clear();
         }
         self.points.push(point);
     }
 
-    /// The last distance, scene units.
-    fn distance(&self) -> Option<f64> {
-        let [.., a, b] = self.points.as_slice() else { return None };
-        Some(a.distance(*b)).filter(|d| *d > 0.0)
+    /// Points of the measurement: those that were put, or those of the selected object's box.
+    fn measured(&self, scene: &ToolScene<'_>, semantics: Option<&Versioned<SemanticMap>>) -> Vec<DVec3> {
+        if self.kind != MeasurementKind::Box {
+            return self.points.clone();
+        }
+        let shape = || semantics?.identities.shapes.get(scene.picking.selected()?);
+        let fitted = shape().and_then(|shape| UprightBox::fit(shape.points(), scene.eye.up));
+        fitted.map_or_else(Vec::new, |fitted| fitted.ends().to_vec())
     }
 
-    /// Normal of the plane of three points, toward `eye`.
-    fn normal(&self, eye: DVec3) -> Option<DVec3> {
-        let [a, b, c] = self.points.as_slice() else { return None };
-        let normal = (*b - *a).cross(*c - *a).try_normalize()?;
-        Some(if normal.dot(eye - *a) < 0.0 { -normal } else { normal })
+    /// The measurement so far, for the view.
+    pub(in crate::ui::viewport) fn drawn(&self, scene: &ToolScene<'_>, state: &AppState) -> DrawnMeasurement {
+        DrawnMeasurement::new(self.kind, self.measured(scene, state.semantics.as_ref()), meters_per_unit(state))
     }
 
-    /// Meters per unit, if the typed text is a length.
+    /// Ends the measurement; returns it with a name and a number of its own, if it has a value.
+    pub(in crate::ui::viewport) fn take(&mut self, scene: &ToolScene<'_>, state: &AppState) -> Option<Measurement> {
+        let points = self.measured(scene, state.semantics.as_ref());
+        self.kind.value(&points).ok()?;
+        let all = &*scene.measurements;
+        let selected = scene.picking.selected().zip(state.semantics.as_ref());
+        let base = match selected.filter(|_| self.kind == MeasurementKind::Box) {
+            Some((id, map)) => format!("Box of {}", state.labels.full_name(&map.identities, id)),
+            None => self.kind.text().to_owned(),
+        };
+        let is_taken = |name: &str| all.iter().any(|m| m.name == name);
+        let name = match self.kind {
+            MeasurementKind::Box if !is_taken(&base) => base,
+            _ => free_name(&base, all),
+        };
+        let id = std::iter::repeat_with(rand::random::<u32>).find(|id| all.iter().all(|m| m.id != *id))?;
+        self.points.clear();
+        Some(Measurement { id, name, kind: self.kind, points, hidden: false })
+    }
+
+    /// Meters per unit, if the typed text is the length of the line.
     fn scale(&self) -> Option<f64> {
+        let Ok(MeasuredValue::Length(length)) = self.kind.value(&self.points) else { return None };
         let meters: f64 = self.known.trim().replace(',', ".").parse().ok()?;
-        Some(meters / self.distance()?).filter(|s| s.is_finite() && *s > 0.0)
+        Some(meters / length).filter(|s| s.is_finite() && *s > 0.0)
+    }
+
+    /// What to do next, or the value.
+    fn says(&self, value: Result<MeasuredValue, GeometryFault>, state: &AppState) -> String {
+        let meters = meters_per_unit(state);
+        if self.missed && self.kind != MeasurementKind::Box {
+            return "No surface there: click again".to_owned();
+        }
+        match (value, self.kind, self.points.len()) {
+            (Ok(value), ..) if meters.is_none() && !matches!(value, MeasuredValue::Angle(_)) => {
+                format!("{} (scale unknown)", value.text(None))
+            }
+            (Ok(value), ..) => value.text(meters),
+            (Err(_), MeasurementKind::Box, _) if state.semantics.is_none() => "Find objects first".to_owned(),
+            (Err(_), MeasurementKind::Box, _) => "Click an object".to_owned(),
+            (Err(GeometryFault::TooFew), _, 0) => "Click the first point on a surface".to_owned(),
+            (Err(GeometryFault::TooFew), MeasurementKind::Angle, 1) => "Click the vertex".to_owned(),
+            (Err(GeometryFault::TooFew), ..) => "Click the next point".to_owned(),
+            (Err(fault), ..) => format!("No value: {fault}"),
+        }
+    }
+
+    fn kinds(&mut self, ui: &mut Ui, cx: &mut Ctx<'_>) {
+        ui.horizontal(|ui| {
+            for kind in MeasurementKind::ALL {
+                let tip = match kind {
+                    MeasurementKind::Length => "Length of a line through points on surfaces.",
+                    MeasurementKind::Angle => "Angle at the second of three points.",
+                    MeasurementKind::Area => "Area of a flat polygon, of three corners or more.",
+                    MeasurementKind::Box => "Edges and volume of the upright box around the selected object.",
+                };
+                if ui.selectable_value(&mut self.kind, kind, kind.text()).on_hover_text(tip).changed() {
+                    (self.points, self.missed) = (Vec::new(), false);
+                }
+            }
+            ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
+                if ui.button("Close").on_hover_text(Action::Measure.tooltip()).clicked() {
+                    cx.ask(Action::Measure);
+                }
+            });
+        });
+    }
+
+    /// Draws the field of the true length, and the button of the floor.
+    fn uses(&mut self, ui: &mut Ui, value: &MeasuredValue, eye: DVec3, cx: &mut Ctx<'_>) {
+        match value {
+            MeasuredValue::Length(_) => {
+                ui.separator();
+                ui.label("True length");
+                let known = TextEdit::singleline(&mut self.known).hint_text("0.30").desired_width(50.0);
+                ui.add(known).accessible_name("True length in meters");
+                ui.label("m");
+                let scale = self.scale();
+                let set = ui.add_enabled(scale.is_some(), Button::new("Set scale"));
+                if let Some(scale) = scale.filter(|_| set.clicked()) {
+                    cx.ask(Action::SetScale(scale));
+                }
+            }
+            MeasuredValue::Area(fit) => {
+                let is_below = self.points.first().is_some_and(|p| fit.normal.dot(eye - *p) < 0.0);
+                let normal = if is_below { -fit.normal } else { fit.normal };
+                ui.separator();
+                if ui.button("Use as the floor").on_hover_text(Action::SetUp(normal).tooltip()).clicked() {
+                    cx.ask(Action::SetUp(normal));
+                }
+            }
+            MeasuredValue::Angle(_) | MeasuredValue::Box(_) => {}
+        }
     }
 }
 
 impl ViewTool for Ruler {
     fn takes_clicks(&self) -> bool {
-        true
+        // Clicks select the object to measure.
+        self.kind != MeasurementKind::Box
     }
 
     /// Puts a point on the surface under a click.
@@ -62,121 +170,142 @@ impl ViewTool for Ruler {
             scene.display.picked(DVec2::new(f64::from(at.x), f64::from(at.y)), scene.eye)
         };
         let clicked = response.interact_pointer_pos().filter(|pos| response.clicked() && area.shown.contains(*pos));
-        if let Some(point) = clicked.and_then(surface) {
-            self.put(point);
+        if let Some(pos) = clicked.filter(|_| self.takes_clicks()) {
+            let point = surface(pos);
+            self.missed = point.is_none();
+            point.into_iter().for_each(|point| self.put(point));
         }
     }
 
-    /// Draws the points and the lines between them.
-    fn paint(&mut self, ui: &Ui, area: ViewArea, scene: &mut ToolScene<'_>, cx: &mut Ctx<'_>) {
-        let shown = area.shown;
-        let meters_per_unit = meters_per_unit(cx);
-        let eye = scene.camera(shown);
-        let painter = ui.painter_at(shown);
-        let place = |p: DVec3| eye.project(p).map(|q| shown.min + vec2(q.x as f32, q.y as f32));
-        let places: Vec<Option<Pos2>> = self.points.iter().map(|p| place(*p)).collect();
-        for (i, pair) in places.windows(2).enumerate() {
-            let [Some(a), Some(b)] = pair else { continue };
-            for stroke in [Stroke::new(4.5, Color32::from_black_alpha(150)), Stroke::new(2.0, theme::warning())] {
-                painter.line_segment([*a, *b], stroke);
-            }
-            let length = format::length(self.points[i].distance(self.points[i + 1]), meters_per_unit);
-            let galley = painter.layout_no_wrap(length, FontId::proportional(14.0), theme::text());
-            let at = a.lerp(*b, 0.5) + vec2(10.0, -0.5 * galley.size().y);
-            painter.rect_filled(
-                Rect::from_min_size(at, galley.size()).expand(5.0),
-                5.0,
-                Color32::from_black_alpha(205),
-            );
-            painter.galley(at, galley, theme::text());
-        }
-        for at in places.iter().flatten() {
-            painter.circle(*at, 5.0, theme::warning(), Stroke::new(1.5, Color32::from_black_alpha(200)));
-        }
-    }
-
-    /// Draws instructions and measurements.
+    /// Draws kinds, value and kept measurements.
     fn card(&mut self, ui: &Ui, places: CardPlaces, scene: &mut ToolScene<'_>, cx: &mut Ctx<'_>) {
-        let meters_per_unit = meters_per_unit(cx);
-        let at = Align2::CENTER_BOTTOM.pos_in_rect(&places.active_view.shrink(12.0));
-        let area = Area::new(Id::unique("ruler")).order(Order::Middle).pivot(Align2::CENTER_BOTTOM).fixed_pos(at);
-        theme::card(ui.ctx(), area.constrain_to(places.active_view), |ui| {
-            ui.horizontal(|ui| {
-                let next = match self.points.len() {
-                    0 => "Click the first point on a surface".to_owned(),
-                    1 => "Click the second point".to_owned(),
-                    _ => self.distance().map_or_else(
-                        || "The points coincide: click again".to_owned(),
-                        |d| match meters_per_unit {
-                            Some(_) => format!("{}, {}", format::length(d, meters_per_unit), format::length(d, None)),
-                            None => format!("{} (scale unknown)", format::length(d, None)),
-                        },
-                    ),
-                };
-                ui.label(RichText::new(next).strong());
-                if ui.button("Clear").clicked() {
-                    self.points.clear();
-                }
-                if ui.button("Close").on_hover_text(Action::Measure.tooltip()).clicked() {
-                    cx.ask(Action::Measure);
+        let state = cx.state;
+        // What grows is at the top, so that the rest stays under the pointer.
+        bottom_card(ui, "ruler", places.active_view, 260.0..=470.0, |ui| {
+            list(ui, scene.measurements, meters_per_unit(state), cx);
+            self.kinds(ui, cx);
+            let value = self.kind.value(&self.measured(scene, state.semantics.as_ref()));
+            ui.horizontal_wrapped(|ui| {
+                ui.label(RichText::new(self.says(value, state)).strong());
+                if let Some(remark) = value.ok().and_then(|value| value.remark(meters_per_unit(state))) {
+                    ui.weak(remark);
                 }
             });
-            if self.distance().is_some() {
-                ui.horizontal(|ui| {
-                    ui.label("True length");
-                    ui.add(TextEdit::singleline(&mut self.known).hint_text("0.30").desired_width(60.0)).widget_info(
-                        || egui::WidgetInfo::labeled(egui::Role::TextInput, true, "True length in meters"),
-                    );
-                    ui.label("m");
-                    let scale = self.scale();
-                    let set = ui.add_enabled(scale.is_some(), egui::Button::new("Set scale"));
-                    if let Some(scale) = scale.filter(|_| set.clicked()) {
-                        cx.ask(Action::SetScale(scale));
-                    }
-                });
-            }
-            match self.normal(scene.eye.center) {
-                Some(normal) if ui.button("Use these three points as the floor").clicked() => {
-                    cx.ask(Action::SetUp(normal));
+            ui.horizontal_wrapped(|ui| {
+                let keep = ui.add_enabled(value.is_ok(), theme::primary_button("Keep"));
+                let keep = keep.on_hover_text(format!("{}  Enter", Action::KeepMeasurement.tooltip()));
+                if keep.on_disabled_hover_text("There is nothing to keep yet.").clicked() {
+                    cx.ask(Action::KeepMeasurement);
                 }
-                None if self.points.len() == 2 => {
-                    ui.weak("Click a third point to define the floor.");
+                let has_points = !self.points.is_empty();
+                let back = ui.add_enabled(has_points, Button::new("Undo point")).on_hover_text("Backspace");
+                if back.clicked() {
+                    self.points.pop();
                 }
-                _ => {}
-            }
+                if ui.add_enabled(has_points, Button::new("Clear")).clicked() {
+                    self.points.clear();
+                }
+                if let Ok(value) = &value {
+                    self.uses(ui, value, scene.eye.center, cx);
+                }
+            });
         });
+        if !keys::is_typing(ui.ctx()) && ui.input(|i| i.key_pressed(Key::Backspace)) {
+            self.points.pop();
+        }
     }
 }
 
-fn meters_per_unit(cx: &Ctx<'_>) -> Option<f64> {
-    cx.state.scene.as_ref().and_then(|scene| scene.meters_per_unit())
+/// Draws the kept measurements.
+fn list(ui: &mut Ui, all: &mut Vec<Measurement>, meters: Option<f64>, cx: &mut Ctx<'_>) {
+    if all.is_empty() {
+        return;
+    }
+    ui.horizontal(|ui| {
+        ui.label(format::things(all.len(), "measurement"));
+        ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
+            if ui.button("Export\u{2026}").on_hover_text(Action::ExportMeasurements.tooltip()).clicked() {
+                cx.ask(Action::ExportMeasurements);
+            }
+        });
+    });
+    let mut gone = None;
+    ScrollArea::vertical().max_height(LIST_PT).show(ui, |ui| {
+        for (i, m) in all.iter_mut().enumerate() {
+            ui.horizontal(|ui| {
+                let mut is_shown = !m.hidden;
+                let tick = ui.checkbox(&mut is_shown, "").on_hover_text("Show it in the view.");
+                tick.accessible_name(format!("{} is visible", m.name));
+                m.hidden = !is_shown;
+                let name = TextEdit::singleline(&mut m.name).desired_width(120.0).char_limit(80).hint_text("Name");
+                if ui.add(name).accessible_name(format!("Name of measurement {}", i + 1)).changed() {
+                    m.name = text::line(&m.name).into_owned();
+                }
+                ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
+                    let delete = ui.button("\u{d7}").on_hover_text("Delete it; can be undone.");
+                    if delete.accessible_name(format!("Delete {}", m.name)).clicked() {
+                        gone = Some(i);
+                    }
+                    let remark = m.value().ok().and_then(|value| value.remark(meters));
+                    let value = ui.add(egui::Label::new(m.text(meters)).truncate());
+                    if let Some(remark) = remark {
+                        value.on_hover_text(remark);
+                    }
+                });
+            });
+        }
+    });
+    if let Some(gone) = gone {
+        all.remove(gone);
+    }
+    ui.separator();
+}
+
+fn meters_per_unit(state: &AppState) -> Option<f64> {
+    state.scene.as_ref().and_then(|scene| scene.meters_per_unit())
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
+    fn value(ruler: &Ruler) -> Result<MeasuredValue, GeometryFault> {
+        ruler.kind.value(&ruler.points)
+    }
+
     #[test]
-    fn two_points_are_a_distance_and_three_a_floor() {
+    fn a_line_sets_the_scale_from_a_true_length() {
         let mut ruler = Ruler::default();
-        assert_eq!((ruler.distance(), ruler.scale(), ruler.normal(DVec3::ZERO)), (None, None, None));
+        assert_eq!((value(&ruler), ruler.scale()), (Err(GeometryFault::TooFew), None));
         ruler.put(DVec3::new(1.0, 0.0, 0.0));
         ruler.put(DVec3::new(1.0, 2.0, 0.0));
-        assert_eq!((ruler.distance(), ruler.scale()), (Some(2.0), None), "nothing was typed");
+        assert_eq!((value(&ruler), ruler.scale()), (Ok(MeasuredValue::Length(2.0)), None), "nothing was typed");
         for (typed, scale) in
             [("0.5", Some(0.25)), (" 1,0 ", Some(0.5)), ("0", None), ("-1", None), ("x", None), ("inf", None)]
         {
             ruler.known = typed.into();
             assert_eq!(ruler.scale(), scale, "{typed}");
         }
-        ruler.put(DVec3::new(3.0, 1.0, 0.0));
-        assert_eq!(ruler.normal(DVec3::new(0.0, 0.0, -5.0)), Some(DVec3::NEG_Z), "toward the eye");
-        assert_eq!(ruler.normal(DVec3::new(0.0, 0.0, 5.0)), Some(DVec3::Z));
-        ruler.put(DVec3::ZERO);
-        assert_eq!((ruler.points.len(), ruler.distance()), (1, None), "the fourth begins anew");
-        ruler.put(DVec3::ZERO);
-        assert_eq!((ruler.distance(), ruler.scale()), (None, None), "twice the same point");
-        ruler.put(DVec3::ZERO);
-        assert_eq!(ruler.normal(DVec3::Z), None, "no plane");
+        ruler.put(DVec3::new(1.0, 4.0, 0.0));
+        ruler.known = "1".into();
+        assert_eq!(ruler.scale(), Some(0.25), "of the whole line");
+        ruler.put(DVec3::new(1.0, 4.0, 0.0));
+        assert_eq!((value(&ruler), ruler.scale()), (Err(GeometryFault::SamePoints), None));
+    }
+
+    #[test]
+    fn an_angle_begins_anew_after_its_third_point() {
+        let mut ruler = Ruler { kind: MeasurementKind::Angle, ..Ruler::default() };
+        for point in [DVec3::X, DVec3::ZERO, DVec3::Y] {
+            ruler.put(point);
+        }
+        assert_eq!(value(&ruler), Ok(MeasuredValue::Angle(std::f64::consts::FRAC_PI_2)));
+        assert_eq!(ruler.scale(), None, "an angle sets no scale");
+        ruler.put(DVec3::Z);
+        assert_eq!((ruler.points.len(), value(&ruler)), (1, Err(GeometryFault::TooFew)));
+        // Control: an area takes another corner.
+        let mut area = Ruler { kind: MeasurementKind::Area, points: vec![DVec3::ZERO, DVec3::X, DVec3::ONE], ..ruler };
+        area.put(DVec3::Y);
+        assert_eq!(area.points.len(), 4);
     }
 }
