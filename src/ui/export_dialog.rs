@@ -150,7 +150,7 @@ impl ExportDialog {
                 None => (waiting.to_owned(), waiting.to_owned()),
                 Some(Err(_)) => ("\u{2013}".to_owned(), "\u{2013}".to_owned()),
                 Some(Ok(written)) => {
-                    let bytes = format::bytes(written.bytes);
+                    let bytes = size_text(written.bytes);
                     let size = if self.is_sampled() { format!("about {bytes}") } else { bytes };
                     let loss = written.drawn.map_or_else(
                         || "\u{2013}".to_owned(),
@@ -175,12 +175,17 @@ impl ExportDialog {
                 let mut about = format.about().to_owned();
                 match found {
                     Some(Ok(written)) if !written.left_out.is_empty() => {
-                        about = format!("{about} Not stored: {}.", written.left_out.join("; "));
+                        let left_out: Vec<String> = written.left_out.iter().map(|what| short(what)).collect();
+                        about = format!("{about} Not stored: {}.", left_out.join("; "));
                     }
                     Some(Err(why)) => about = format!("{about} Cannot be written: {why}."),
                     _ => {}
                 }
-                ui.label(RichText::new(about).small().color(if can_write { theme::weak() } else { theme::warning() }));
+                let color = if can_write { theme::weak() } else { theme::warning() };
+                let about = ui.label(RichText::new(about).small().color(color));
+                if let Some(Ok(written)) = found.filter(|_| about.hovered()) {
+                    about.on_hover_text(written.lines().get(1..).unwrap_or_default().join("\n"));
+                }
             });
             if clicked {
                 self.format = format;
@@ -209,6 +214,24 @@ impl ExportDialog {
     }
 }
 
+/// Bytes with as many digits as tell formats apart: "1.4 MB".
+fn size_text(bytes: u64) -> String {
+    match bytes {
+        1_000..10_000 => format!("{:.1} kB", bytes as f64 / 1e3),
+        1_000_000..100_000_000 => format!("{:.1} MB", bytes as f64 / 1e6),
+        _ => format::bytes(bytes),
+    }
+}
+
+/// A list of properties by its first one.
+fn short(what: &str) -> String {
+    let names = what.strip_prefix("the properties ").map(|names| names.split(", ").collect::<Vec<_>>());
+    match names.as_deref() {
+        Some([first, rest @ ..]) if rest.len() > 1 => format!("{} properties ({first}, \u{2026})", rest.len() + 1),
+        _ => what.to_owned(),
+    }
+}
+
 /// A row of the list: a name, and two values at the right.
 fn columns<T>(ui: &mut Ui, name: impl FnOnce(&mut Ui) -> T, size: &str, loss: &str, color: egui::Color32) {
     ui.horizontal(|ui| {
@@ -224,4 +247,19 @@ fn columns<T>(ui: &mut Ui, name: impl FnOnce(&mut Ui) -> T, size: &str, loss: &s
             }
         });
     });
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn texts_are_short_and_tell_formats_apart() {
+        assert_eq!(
+            [999, 1_280, 123_456, 1_440_000, 1_360_000, 123_000_000].map(size_text),
+            ["999 B", "1.3 kB", "123 kB", "1.4 MB", "1.4 MB", "123 MB"]
+        );
+        assert_eq!(short("the properties a, b, c"), "3 properties (a, \u{2026})");
+        assert_eq!(["the properties a, b", "flag of surfels"].map(short), ["the properties a, b", "flag of surfels"]);
+    }
 }

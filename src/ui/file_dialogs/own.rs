@@ -2,6 +2,7 @@
 //! a folder or ends the dialog, `Alt+Up` leads to the folder above.
 
 use std::path::{Path, PathBuf};
+use std::rc::Rc;
 
 use crossbeam_channel::Receiver;
 use egui::{Checkbox, Context, Id, Key, Modifiers, Order, TextEdit, Ui};
@@ -20,6 +21,9 @@ use crate::worker::Repaint;
 
 /// Rows that Page Up and Page Down go.
 const PAGE: usize = 10;
+/// Frames in which the name field takes the keyboard: the first measures the dialog, and a newly focused field loses its
+/// selection.
+const FOCUS_FRAMES: u8 = 3;
 
 /// What is in the way of the choice.
 enum Obstacle {
@@ -37,7 +41,7 @@ pub(super) struct OwnDialog {
     request: FileRequest,
     repaint: Repaint,
     folder: PathBuf,
-    listing: FolderListing,
+    listing: Rc<FolderListing>,
     /// The folder that is being read.
     reading: Option<Receiver<FolderListing>>,
     place: PlaceRow,
@@ -69,7 +73,7 @@ impl OwnDialog {
             request,
             repaint,
             folder: PathBuf::new(),
-            listing: FolderListing::default(),
+            listing: Rc::default(),
             reading: None,
             place: PlaceRow::default(),
             name,
@@ -97,7 +101,7 @@ impl OwnDialog {
             self.name.clear();
         }
         (self.selected, self.obstacle, self.place) = (None, None, PlaceRow::default());
-        self.takes_keys = 2;
+        (self.listing, self.takes_keys) = (Rc::default(), FOCUS_FRAMES);
         // Parts such as ".." are not shown.
         self.folder = std::path::absolute(&folder).ok().and_then(|f| f.canonicalize().ok()).unwrap_or(folder);
         self.read();
@@ -119,10 +123,10 @@ impl OwnDialog {
             if replace {
                 return Some(path);
             }
-            self.takes_keys = 2;
+            self.takes_keys = FOCUS_FRAMES;
         }
         if let Some(listing) = self.reading.as_ref().and_then(|r| r.try_recv().ok()) {
-            (self.listing, self.reading) = (listing, None);
+            (self.listing, self.reading) = (Rc::new(listing), None);
         }
         // Another program may have written files meanwhile.
         if ctx.input(|i| i.events.contains(&egui::Event::WindowFocused(true))) {
@@ -147,8 +151,8 @@ impl OwnDialog {
         ui.heading(&self.request.title);
         ui.add_space(4.0);
         self.place_row(ui);
-        let entries: Vec<FolderEntry> = self.entries().cloned().collect();
-        let entries: Vec<&FolderEntry> = entries.iter().collect();
+        let listing = Rc::clone(&self.listing);
+        let entries = self.listed(&listing);
         let mut wanted = self.arrows(ui, &entries);
         let selected = self.selected.as_ref().and_then(|path| entries.iter().position(|e| e.path == *path));
         let empty = match (&self.reading, &self.listing.problem) {
@@ -199,12 +203,12 @@ impl OwnDialog {
     }
 
     /// Entries that are listed.
-    fn entries(&self) -> impl Iterator<Item = &FolderEntry> {
+    fn listed<'a>(&self, listing: &'a FolderListing) -> Vec<&'a FolderEntry> {
         let format = self.request.formats.get(self.format);
-        let fits = move |e: &&FolderEntry| {
+        let fits = |e: &&FolderEntry| {
             (self.shows_hidden || !e.is_hidden()) && (e.is_folder || format.is_none_or(|format| format.fits(&e.name)))
         };
-        self.listing.entries.iter().filter(|_| self.reading.is_none()).filter(fits)
+        listing.entries.iter().filter(fits).collect()
     }
 
     /// The row of the folder, and where it leads.
@@ -219,7 +223,7 @@ impl OwnDialog {
                     self.enter(folder);
                 }
             }
-            Some(PlaceAct::Leave) => self.takes_keys = 2,
+            Some(PlaceAct::Leave) => self.takes_keys = FOCUS_FRAMES,
         }
     }
 
@@ -276,7 +280,7 @@ impl OwnDialog {
             self.name.clone_from(&entry.name);
             self.follow_ending();
         }
-        self.takes_keys = self.takes_keys.max(1);
+        self.takes_keys = FOCUS_FRAMES;
     }
 
     /// Chooses the format that the name's ending asks for.
@@ -296,9 +300,9 @@ impl OwnDialog {
         ui.add_space(4.0);
         let edit = ui.horizontal(|ui| {
             ui.label("Name");
-            let formats = if self.request.formats.is_empty() { 0.0 } else { format_list::WIDTH_PT + 16.0 };
-            if std::mem::take(&mut self.takes_keys) > 1 {
-                self.takes_keys = 1;
+            let formats = if self.request.formats.is_empty() { 0.0 } else { format_list::WIDTH_PT + 8.0 };
+            if self.takes_keys > 0 {
+                self.takes_keys -= 1;
                 ui.memory_mut(|m| m.request_focus(name_field()));
                 let stem = self.request.stem(&self.name).map_or(0, |stem| stem.chars().count());
                 select_start(ui.ctx(), name_field(), if saves { stem } else { self.name.chars().count() });
@@ -306,14 +310,14 @@ impl OwnDialog {
             }
             let hint = if self.request.is_folder() { "This folder" } else { "" };
             let edit = TextEdit::singleline(&mut self.name).id(name_field()).hint_text(hint);
-            let edit = edit.desired_width(ui.available_width() - formats - 12.0).align(egui::Align2::LEFT_CENTER);
+            let edit = edit.desired_width(ui.available_width() - formats).align(egui::Align2::LEFT_CENTER);
             let edit = ui.add(edit).accessible_name("File name");
             format_list::show(ui, &self.request, &mut self.format);
             edit
         });
         let edit = edit.inner;
         if edit.changed() {
-            (self.obstacle, self.selected) = (None, None);
+            (self.obstacle, self.selected, self.takes_keys) = (None, None, 0);
             self.follow_ending();
             if !saves && !self.name.is_empty() {
                 let typed = self.name.to_lowercase();
@@ -332,7 +336,7 @@ impl OwnDialog {
             self.name = self.request.named(&self.stem, self.format);
         }
         let enters = edit.lost_focus() && ui.input(|i| i.key_pressed(Key::Enter));
-        self.takes_keys = if enters { 2 } else { self.takes_keys };
+        self.takes_keys = if enters { FOCUS_FRAMES } else { self.takes_keys };
         enters
     }
 
@@ -363,12 +367,13 @@ impl OwnDialog {
 
     /// Ends the dialog with a path, if the choice can be made.
     fn decide(&mut self, by_button: bool) -> Option<PathBuf> {
-        let entry = self.selected.as_ref().and_then(|path| self.entries().find(|e| e.path == *path)).cloned();
+        let listing = Rc::clone(&self.listing);
+        let entry = listing.entries.iter().find(|e| Some(&e.path) == self.selected.as_ref());
         match entry {
             // The button chooses the folder that is selected.
-            Some(entry) if entry.is_folder && by_button && self.request.is_folder() => return Some(entry.path),
-            Some(entry) if entry.is_folder && !(self.request.saves() && by_button) => self.enter(entry.path),
-            Some(entry) if !entry.is_folder && !self.request.saves() => return Some(entry.path),
+            Some(entry) if entry.is_folder && by_button && self.request.is_folder() => return Some(entry.path.clone()),
+            Some(entry) if entry.is_folder && !(self.request.saves() && by_button) => self.enter(entry.path.clone()),
+            Some(entry) if !entry.is_folder && !self.request.saves() => return Some(entry.path.clone()),
             _ => match judge(&self.request, &self.folder, &self.name, self.format) {
                 Verdict::Chosen(path) => return Some(path),
                 Verdict::Replaces(path) => self.replaces = Some(path),

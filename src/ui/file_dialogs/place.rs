@@ -34,7 +34,7 @@ impl PlaceRow {
             let up = ui.add_enabled(folder.parent().is_some(), Button::new("\u{2191}"));
             let up = up.on_hover_text("Folder above  Alt+Up").accessible_name("Folder above");
             let above = up.clicked() || ui.input_mut(|i| i.consume_key(Modifiers::ALT, Key::ArrowUp));
-            let entered = self.field(ui, folder, if creates { 112.0 } else { 0.0 });
+            let entered = self.field(ui, folder, if creates { 97.0 } else { 0.0 });
             if creates && ui.button("New folder").clicked() {
                 self.new_folder = Some(String::new());
             }
@@ -45,7 +45,7 @@ impl PlaceRow {
 
     /// The folder's field; returns what was typed, at `Enter`.
     fn field(&mut self, ui: &mut Ui, folder: &Path, aside_pt: f32) -> Option<String> {
-        let (id, width) = (Id::unique("file dialog folder"), ui.available_width() - aside_pt - 20.0);
+        let (id, width) = (Id::unique("file dialog folder"), ui.available_width() - aside_pt);
         let shown = folder.display().to_string();
         let is_typed = ui.memory(|m| m.has_focus(id));
         let text = match is_typed {

@@ -153,7 +153,7 @@ fn sizes_and_losses_are_known_before_gaussians_are_saved() {
     let path = folder.path().canonicalize().expect("there").join("dots.splat");
     until_written(&mut w, path.clone());
     let bytes = std::fs::metadata(path).expect("there").len();
-    let size = if bytes < 1000 { format!("{bytes} B") } else { format!("{:.0} kB", bytes as f64 / 1000.0) };
+    let size = if bytes < 1000 { format!("{bytes} B") } else { format!("{:.1} kB", bytes as f64 / 1000.0) };
     assert!(texts.contains(&size), "{size} of {texts:?}");
     let log = &w.app().state.log;
     let line = log.iter().find(|l| l.text.starts_with("drawn from 4 views")).expect("the loss").text.clone();
