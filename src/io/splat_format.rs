@@ -60,6 +60,34 @@ impl SplatFormat {
         }
     }
 
+    /// Name in a list of formats.
+    pub(crate) fn title(self) -> &'static str {
+        match self {
+            Self::Ply => "PLY (.ply)",
+            Self::CompressedPly => "Compressed PLY (.compressed.ply)",
+            Self::Spz => "SPZ (.spz)",
+            Self::Sog => "SOG (.sog)",
+            Self::SogFolder => "SOG pictures (meta.json)",
+            Self::Splat => "Splat (.splat)",
+            Self::Glb => "glTF (.glb)",
+            Self::Gltf => "glTF as text (.gltf)",
+        }
+    }
+
+    /// Description for a user who chooses a format.
+    pub(crate) fn about(self) -> &'static str {
+        match self {
+            Self::Ply => "Read by every viewer and editor of Gaussians.",
+            Self::CompressedPly => "PlayCanvas and SuperSplat. Quick to load.",
+            Self::Spz => "Niantic and Scaniverse. Small, for phones and the web.",
+            Self::Sog => "PlayCanvas. The smallest, for the web; slow to write.",
+            Self::SogFolder => "The same as SOG, as pictures in a folder.",
+            Self::Splat => "The first viewers on the web.",
+            Self::Glb => "glTF with KHR_gaussian_splatting, in one file.",
+            Self::Gltf => "The same as .glb, as text.",
+        }
+    }
+
     /// All endings, for display.
     pub(crate) fn endings() -> String {
         Self::VARIANTS.iter().map(|format| format.ending()).collect::<Vec<_>>().join(", ")

@@ -21,6 +21,7 @@ pub(crate) mod evaluate_removal;
 mod experiment;
 pub(crate) mod export;
 pub(crate) mod export_all;
+pub(crate) mod export_forecast;
 pub(crate) mod export_splat;
 pub mod find_objects;
 pub(crate) mod folders;

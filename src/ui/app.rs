@@ -9,6 +9,7 @@ use super::camera::CameraPane;
 use super::chat::Chat;
 use super::ctx::Ctx;
 use super::dialogs::{DialogAnswer, Question};
+use super::export_dialog::ExportDialog;
 use super::file_dialogs::{FileDialogs, FileRequest};
 use super::find_dialog::FindDialog;
 use super::history::{EditStep, Editing};
@@ -56,6 +57,9 @@ pub struct App {
     pub(super) dialogs: FileDialogs<Self>,
     pub(super) question: Option<(Question, ThenAnswer)>,
     pub(super) find_dialog: FindDialog,
+    pub(super) export_dialog: Option<ExportDialog>,
+    /// True if the dialog for a video is open.
+    pub(super) asks_for_video: bool,
     pub(super) keep_dialog: Option<KeepDialog>,
     /// True if the query field is open although queries are impossible.
     pub(super) asks_in_vain: bool,
@@ -126,6 +130,8 @@ impl App {
             dialogs: FileDialogs::default(),
             question: None,
             find_dialog: FindDialog::default(),
+            export_dialog: None,
+            asks_for_video: false,
             keep_dialog: None,
             asks_in_vain: false,
             palette: Palette::default(),
@@ -244,7 +250,7 @@ impl App {
 
     /// Asks for a path; `then` continues with it.
     pub(super) fn choose(&mut self, request: FileRequest, then: impl FnOnce(&mut Self, PathBuf) + 'static) {
-        let (folder, repaint) = (self.layout.folder.as_deref(), Arc::clone(&self.repaint));
+        let (folder, repaint) = (self.layout.folder_of(request.kind()), Arc::clone(&self.repaint));
         if let Err(e) = self.dialogs.ask(request, folder, repaint, Box::new(then)) {
             self.state.fail("Opening the file dialog", Failure::of(&e, "Close other programs and try again."));
         }

@@ -1,12 +1,14 @@
 //! Layout and settings that the window stores between runs.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use egui::ThemePreference;
 use serde::{Deserialize, Serialize};
 
 use super::chat_model::ChatSettings;
 use super::dock::Dock;
+use super::file_kind::{FileKind, KindFolders};
+use super::video_choice::VideoChoice;
 use crate::jobs::find_objects::FindSettings;
 use crate::pipeline::train::TrainConfig;
 use crate::scene::Overrides;
@@ -88,9 +90,13 @@ pub struct Layout {
     pub finding: FindSettings,
     /// Planner of the agent.
     pub(crate) chat: ChatSettings,
+    /// Choices for videos.
+    pub(crate) video: VideoChoice,
     /// Recently opened files and folders.
     pub(crate) recent: Vec<PathBuf>,
-    /// Folder of the last file dialog.
+    /// Folder that each kind of files was last chosen from.
+    pub folders: KindFolders,
+    /// Folder for kinds that were never chosen: the one that a scene was last chosen from.
     pub folder: Option<PathBuf>,
 }
 
@@ -114,7 +120,9 @@ impl Default for Layout {
             plan: Overrides::default(),
             finding: FindSettings::default(),
             chat: ChatSettings::default(),
+            video: VideoChoice::default(),
             recent: Vec::new(),
+            folders: KindFolders::new(),
             folder: None,
         }
     }
@@ -132,6 +140,21 @@ impl Layout {
 
     pub(crate) fn save(&self, storage: &mut dyn eframe::Storage) {
         eframe::set_value(storage, KEY, self);
+    }
+
+    /// Folder that a dialog for this kind of files begins in.
+    pub(crate) fn folder_of(&self, kind: FileKind) -> Option<&Path> {
+        let own = self.folders.get(&kind).filter(|folder| folder.is_dir());
+        own.or(self.folder.as_ref()).map(PathBuf::as_path)
+    }
+
+    /// Remembers where a path of this kind was chosen.
+    pub(crate) fn remember_folder(&mut self, kind: FileKind, path: &Path) {
+        let Some(folder) = path.parent().filter(|folder| folder.is_dir()) else { return };
+        self.folders.insert(kind, folder.to_owned());
+        if kind.is_scene() {
+            self.folder = Some(folder.to_owned());
+        }
     }
 
     /// Mode of the first or the second view.
@@ -187,6 +210,28 @@ mod tests {
         assert!(!layout.shows(Pane::Dataset));
         layout.toggle(Pane::Dataset);
         assert!(layout.shows(Pane::Dataset));
+    }
+
+    #[test]
+    fn each_kind_of_files_has_its_folder_and_keeps_it() {
+        let place = tempfile::tempdir().expect("folder");
+        let [photos, pages] = ["photos", "pages"].map(|name| place.path().join(name));
+        [&photos, &pages].into_iter().for_each(|folder| std::fs::create_dir(folder).expect("made"));
+        let mut layout = Layout::default();
+        layout.remember_folder(FileKind::Photos, &photos.join("plush"));
+        layout.remember_folder(FileKind::Pages, &pages.join("a.html"));
+        layout.remember_folder(FileKind::Videos, Path::new("/no/such/folder/a.mp4"));
+        let mut storage = Memory::default();
+        layout.save(&mut storage);
+        let mut layout = Layout::load(Some(&storage));
+        assert_eq!(layout.folder_of(FileKind::Pages), Some(&*pages));
+        for kind in [FileKind::Photos, FileKind::Masks, FileKind::Videos] {
+            assert_eq!(layout.folder_of(kind), Some(&*photos), "{kind:?}: not where a page was written");
+        }
+        layout.remember_folder(FileKind::Masks, &pages.join("masks"));
+        assert_eq!(layout.folder_of(FileKind::Masks), Some(&*pages));
+        std::fs::remove_dir(&pages).expect("removed");
+        assert_eq!(layout.folder_of(FileKind::Masks), Some(&*photos), "its own is gone");
     }
 
     #[test]

@@ -17,7 +17,9 @@ mod context;
 mod ctx;
 pub(crate) mod dialogs;
 mod dock;
+mod export_dialog;
 mod file_dialogs;
+mod file_kind;
 mod find_dialog;
 mod fonts;
 mod frame;
@@ -36,6 +38,8 @@ mod text_field;
 pub(crate) mod theme;
 pub(crate) mod toasts;
 mod train_history;
+mod video_choice;
+mod video_dialog;
 pub mod viewport;
 
 use std::sync::Arc;

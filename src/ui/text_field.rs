@@ -13,6 +13,11 @@ pub(super) fn select_all(ctx: &Context, field: Id, text: &str) {
     set_range(ctx, field, CCursorRange::two(CCursor::new(0), CCursor::new(text.chars().count())));
 }
 
+/// Selects the first `letters` of the text that the field now holds.
+pub(super) fn select_start(ctx: &Context, field: Id, letters: usize) {
+    set_range(ctx, field, CCursorRange::two(CCursor::new(0), CCursor::new(letters)));
+}
+
 /// Focuses a field that is yet to be drawn, with all of its text selected: text typed in this frame replaces it.
 pub(super) fn take_keyboard(ctx: &Context, field: Id, text: &mut String) {
     ctx.memory_mut(|m| m.request_focus(field));

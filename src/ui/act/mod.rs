@@ -5,6 +5,7 @@
 pub(super) mod edit;
 pub(super) mod edits;
 pub(super) mod export;
+pub(super) mod gaussians;
 pub(super) mod measure;
 pub(super) mod objects;
 pub(super) mod open;

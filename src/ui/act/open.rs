@@ -15,21 +15,23 @@ use crate::ui::app::App;
 use crate::ui::camera;
 use crate::ui::comparison::ComparedScene;
 use crate::ui::dialogs::{DialogAnswer, Question};
-use crate::ui::file_dialogs::FileRequest;
+use crate::ui::file_dialogs::{FileFormat, FileRequest};
+use crate::ui::file_kind::FileKind;
 use crate::ui::state::{ShownReport, Tone};
 use crate::worker::{Failure, JobInfo, Makes};
 
 /// File endings of scenes.
 const SCENES: [&str; 13] =
-    ["ply", "splat", "ksplat", "spz", "sog", "gltf", "glb", "json", "toml", "npy", "bin", "txt", "zip"];
+    [".ply", ".splat", ".ksplat", ".spz", ".sog", ".gltf", ".glb", ".json", ".toml", ".npy", ".bin", ".txt", ".zip"];
 
 pub(in crate::ui) fn choose_folder(app: &mut App) {
-    let request = FileRequest::folder("Open a folder of photos or a trained scene");
+    let request = FileRequest::folder(FileKind::Photos, "Open photos or a scene");
     app.choose(request, |app, path| app.ask(Action::Open(path)));
 }
 
 pub(in crate::ui) fn choose_file(app: &mut App) {
-    app.choose(FileRequest::file("Open a scene", "Scenes", &SCENES), |app, path| app.ask(Action::Open(path)));
+    let request = FileRequest::file(FileKind::Scenes, "Open file", vec![FileFormat::new("Scenes", &SCENES)]);
+    app.choose(request, |app, path| app.ask(Action::Open(path)));
 }
 
 /// Opens a report, a file of training settings, or another scene.
@@ -130,7 +132,7 @@ fn replace_scene(app: &mut App, open: impl FnOnce(&mut App) + 'static) {
 }
 
 pub(in crate::ui) fn choose_comparison(app: &mut App) {
-    let request = FileRequest::folder("Open the folder of another scene");
+    let request = FileRequest::folder(FileKind::Scenes, "Compare with another scene");
     app.choose(request, |app, path| compare_scene(app, Some(path)));
 }
 
@@ -152,7 +154,8 @@ pub(in crate::ui) fn compare_scene(app: &mut App, path: Option<PathBuf>) {
 }
 
 pub(in crate::ui) fn choose_report(app: &mut App, second: bool) {
-    let request = FileRequest::file("Open a report", "Reports", &["json"]);
+    let request =
+        FileRequest::file(FileKind::Reports, "Open report", vec![FileFormat::new("Reports (.json)", &[".json"])]);
     app.choose(request, move |app, path| report(app, path, second));
 }
 
@@ -180,7 +183,8 @@ fn preset(app: &mut App, path: &Path) {
 }
 
 pub(in crate::ui) fn choose_path(app: &mut App) {
-    app.choose(FileRequest::file("Open a camera path", "Camera paths", &["json"]), |app, path| {
+    let formats = vec![FileFormat::new("Camera paths (.json)", &[".json"])];
+    app.choose(FileRequest::file(FileKind::Paths, "Open camera path", formats), |app, path| {
         match camera::read(&path) {
             Ok(read) => {
                 app.camera.open(read);

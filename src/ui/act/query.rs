@@ -18,7 +18,8 @@ use crate::ui::actions::Pane;
 use crate::ui::app::App;
 use crate::ui::chat::Snapshot;
 use crate::ui::context::SceneContext;
-use crate::ui::file_dialogs::FileRequest;
+use crate::ui::file_dialogs::{FileFormat, FileRequest};
+use crate::ui::file_kind::FileKind;
 use crate::ui::history::EditStep;
 use crate::ui::keys;
 use crate::ui::state::Tone;
@@ -66,7 +67,7 @@ pub(in crate::ui) fn ask(app: &mut App, text: &str) {
 }
 
 pub(in crate::ui) fn choose_phrases_folder(app: &mut App) {
-    app.choose(FileRequest::folder("Choose a folder for the masks"), |app, to| run_phrases(app, Some(to)));
+    app.choose(FileRequest::new_folder(FileKind::Masks, "Folder for the masks"), |app, to| run_phrases(app, Some(to)));
 }
 
 /// Runs the list of phrases; writes the masks into `to`, if given.
@@ -112,7 +113,11 @@ pub(in crate::ui) fn run_phrases(app: &mut App, to: Option<PathBuf>) {
 }
 
 pub(in crate::ui) fn choose_true_mask(app: &mut App) {
-    let request = FileRequest::file("Choose the true mask of this view", "Masks", &["png", "bmp", "tif", "tiff"]);
+    let request = FileRequest::file(
+        FileKind::Masks,
+        "True mask of this view",
+        vec![FileFormat::new("Masks (.png, .bmp, .tif)", &[".png", ".bmp", ".tif", ".tiff"])],
+    );
     app.choose(request, |app, path| compare_with_mask(app, Some(&path)));
 }
 
@@ -138,7 +143,12 @@ pub(in crate::ui) fn save_true_mask(app: &mut App) {
         return app.state.toast(Tone::Info, "This view has no true mask: load or paint one.");
     }
     let scene = app.state.scene.as_ref().map_or("scene", |s| &s.name);
-    let request = FileRequest::save("Save the true mask", format!("{scene}-true-mask.png"));
+    let request = FileRequest::save(
+        FileKind::Masks,
+        "Save true mask",
+        &format!("{scene}-true-mask"),
+        vec![FileFormat::new("PNG (.png)", &[".png"])],
+    );
     app.choose(request, |app, path| {
         let Some(mask) = app.viewport.queries.truth() else { return };
         match export::check(&path, &[".png"], &[]).and_then(|()| write_mask(&path, &mask)) {

@@ -22,7 +22,7 @@ macro_rules! action_table {
             TrainDemo: "Train the demo yourself",
                 "Render posed photos of the tabletop and train on them. No download needed." => open::demo_photos(app);
             ExportPly: "Export Gaussians\u{2026}", "Write the Gaussians as .ply, .spz, .sog, .glb or others that viewers read.", "Ctrl+E"
-                => export::all_gaussians(app);
+                => gaussians::all(app);
             ExportAll: "Export all objects and parts\u{2026}",
                 "Into a folder: a .ply each, and their masks in the photos as ISAT, COCO and id pictures."
                 => export::all_objects(app);
@@ -119,7 +119,7 @@ macro_rules! action_table {
             Hide(id: IdentityId): format!("Hide or show #{id}"), "Hide it in the view, or show it again."
                 => view::hide(app, id);
             ExportTarget(id: IdentityId): format!("Export #{id}\u{2026}"),
-                "Write its Gaussians in the format that 3DGS viewers read." => export::identity(app, id);
+                "Write its Gaussians in the format that 3DGS viewers read." => gaussians::identity(app, id);
             Remove(id: IdentityId): format!("Remove #{id} and fill"),
                 "Make a copy of the scene without it, shown beside this one. What it hid is filled from what is around."
                 => objects::remove(app, &[id]);
@@ -145,10 +145,10 @@ macro_rules! action_table {
                 "Those that are outlined, or selected in the Clean pane; can be undone, and the scene that was opened stays as it is."
                 => edit::delete_chosen(app);
             ExportSelection: "Export the selected Gaussians\u{2026}", "Write the selection in the format that 3DGS viewers read."
-                => export::selection(app);
+                => gaussians::selection(app);
             ExportCrop: "Export what the crop box keeps\u{2026}",
                 "Write the Gaussians whose centers it keeps, hidden ones too, in the format that 3DGS viewers read."
-                => export::crop(app);
+                => gaussians::crop(app);
             Change(edit: Edit): match edit {
                     Edit::Rename(_, name) => format!("Rename to {name}"),
                     Edit::Merge(from, into) => format!("Merge #{from} into #{into}"),

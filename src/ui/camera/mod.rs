@@ -8,7 +8,7 @@ mod timeline;
 use std::collections::VecDeque;
 use std::path::Path;
 
-use egui::{Align, Button, Checkbox, ComboBox, DragValue, Layout, RichText, ScrollArea, Slider, Ui, vec2};
+use egui::{Align, Button, Checkbox, ComboBox, DragValue, Layout, RichText, ScrollArea, Ui, vec2};
 
 use self::player::{Clip, Player};
 use super::ctx::Ctx;
@@ -34,12 +34,6 @@ pub(crate) struct CameraPane {
     shows_more: bool,
     /// Path and speed that the player's spline was last made of.
     loaded: Option<(CameraPath, Speed)>,
-    /// Height of videos, px.
-    video_height: u32,
-    /// Quality of videos, 0 to 100.
-    quality: u8,
-    /// True if the found identities are marked in videos.
-    pub(crate) mark: bool,
     /// True if the view shows the places that the camera can reach.
     pub(crate) show_reach: bool,
     /// Flights that wait for the one that plays, with the names of their targets.
@@ -65,9 +59,6 @@ impl Default for CameraPane {
             selected: None,
             shows_more: false,
             loaded: None,
-            video_height: 720,
-            quality: 80,
-            mark: false,
             show_reach: false,
             next: VecDeque::new(),
             flight_to: String::new(),
@@ -195,17 +186,27 @@ impl CameraPane {
         }
     }
 
-    /// Cameras and settings of a video of the loaded clip; `None` without a clip.
-    pub(crate) fn video(&self, out: &Path, aspect: f64) -> Option<(Vec<Camera>, VideoSettings)> {
-        let height = self.video_height;
-        let width = (((f64::from(height) * aspect) / 2.0).round().max(1.0) * 2.0) as u32;
+    /// Frames and seconds of a video of the loaded clip; `None` without a clip.
+    pub(crate) fn length(&self) -> Option<(usize, f64)> {
+        let seconds = self.player.clip()?.seconds();
+        Some((steps_of(seconds, self.path.fps, MOST_PICTURES) + 1, seconds))
+    }
+
+    /// Cameras and settings of a video of the loaded clip; `None` without a clip. The vertical field of view is the
+    /// clip's.
+    pub(crate) fn video(
+        &self,
+        out: &Path,
+        [width, height]: [u32; 2],
+        quality: u8,
+    ) -> Option<(Vec<Camera>, VideoSettings)> {
         let clip = self.player.clip()?;
         let frames = steps_of(clip.seconds(), self.path.fps, MOST_PICTURES);
         let time = |i: usize| clip.seconds() * i as f64 / frames as f64;
         let cameras = (0..=frames).filter_map(|i| clip.at(time(i))).map(|p| p.camera(width, height)).collect();
         let mut settings = VideoSettings::new(width, height, self.path.fps);
         // The dialog has asked whether the file may be replaced.
-        (settings.quality, settings.overwrite) = (self.quality, out.exists());
+        (settings.quality, settings.overwrite) = (quality, out.exists());
         Some((cameras, settings))
     }
 
@@ -326,21 +327,6 @@ impl CameraPane {
         if button.on_hover_text(Action::ExportVideo.tooltip()).on_disabled_hover_text(why).clicked() {
             cx.ask(Action::ExportVideo);
         }
-        let height = ComboBox::from_id_salt("video height")
-            .selected_text(format!("{} px", self.video_height))
-            .width(72.0)
-            .show_ui(ui, |ui| {
-                for height in [360, 480, 720, 1080, 2160] {
-                    ui.selectable_value(&mut self.video_height, height, format!("{height} px"));
-                }
-            });
-        height.response.accessible_name("Video height");
-        ui.add(DragValue::new(&mut self.path.fps).range(1.0..=120.0).speed(0.2).suffix(" fps"))
-            .accessible_name("Frames per second");
-        let quality = ui.label("Quality").id;
-        ui.add(Slider::new(&mut self.quality, 0..=100)).labelled_by(quality);
-        ui.checkbox(&mut self.mark, "Highlight")
-            .on_hover_text("Highlight the answer to the query in every frame of the video.");
     }
 }
 

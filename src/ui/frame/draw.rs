@@ -2,7 +2,7 @@
 
 use egui::{CentralPanel, Frame, Margin, Panel, ScrollArea, Ui};
 
-use crate::ui::act::objects;
+use crate::ui::act::{export, gaussians, objects};
 use crate::ui::actions::{Action, Pane};
 use crate::ui::app::App;
 use crate::ui::ctx::Ctx;
@@ -51,6 +51,8 @@ pub(super) fn over_everything(app: &mut App, ctx: &egui::Context) {
         then(app, answer);
     }
     objects::show_dialogs(app, ctx);
+    gaussians::show_dialog(app, ctx);
+    export::show_video_dialog(app, ctx);
     if let Some(photos) = app.state.unposed.take() {
         let stays = unposed::show(ctx, &photos, &mut app.context().0);
         app.state.unposed = Some(photos).filter(|_| stays);
@@ -59,9 +61,8 @@ pub(super) fn over_everything(app: &mut App, ctx: &egui::Context) {
         let is_read = dialogs::show_error(ctx, &error, &mut app.context().0);
         app.state.error = Some(error).filter(|_| !is_read);
     }
-    if let Some((then, path)) = app.dialogs.show(ctx) {
-        let folder = if path.is_dir() { Some(path.as_path()) } else { path.parent() };
-        app.layout.folder = folder.map(Into::into);
+    if let Some((then, kind, path)) = app.dialogs.show(ctx) {
+        app.layout.remember_folder(kind, &path);
         then(app, path);
         // The view and the dialogs of this frame are drawn already.
         ctx.request_repaint();

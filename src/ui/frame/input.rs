@@ -17,11 +17,13 @@ pub(super) fn take(app: &mut App, ctx: &Context) {
         || app.state.unposed.is_some()
         || app.question.is_some()
         || app.find_dialog.is_open()
+        || app.export_dialog.is_some()
+        || app.asks_for_video
         || app.keep_dialog.is_some()
         || app.dialogs.is_own_open();
     // An open menu takes the keys; Escape closes only the menu.
     let has_menu = egui::Popup::is_any_open(ctx);
-    if has_menu && ctx.input_mut(|i| i.consume_key(Modifiers::NONE, Key::Escape)) {
+    if has_menu && !app.dialogs.is_own_open() && ctx.input_mut(|i| i.consume_key(Modifiers::NONE, Key::Escape)) {
         egui::Popup::close_all(ctx);
     }
     query::follow_vain_query(app, ctx);

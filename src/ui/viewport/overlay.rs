@@ -37,6 +37,11 @@ fn card(ui: &Ui, rect: Rect, name: &'static str, align: Align2, down: f32, add: 
     theme::card(ui.ctx(), area, |ui| ui.horizontal(|ui| add(ui)));
 }
 
+/// Width of a view in which the name of another scene stands beside the modes, points.
+const NARROW_BESIDE_MODES: f32 = 640.0;
+/// Space of a letter of that name, points.
+const LETTER_PT: f32 = 7.8;
+
 /// Content of the cards over a view.
 pub(super) struct ViewCards<'a> {
     pub(super) display: &'a Display,
@@ -78,7 +83,10 @@ impl ViewCards<'_> {
         }
         if second {
             if let Some(comparison) = &state.comparison {
-                card(ui, rect, "beside", Align2::RIGHT_TOP, 0.0, |ui| self.comparison_bar(ui, comparison, cx));
+                // Beside the modes if there is room, else below them.
+                let is_wide = rect.width() > NARROW_BESIDE_MODES;
+                let (align, down) = if is_wide { (Align2::RIGHT_TOP, 0.0) } else { (Align2::LEFT_TOP, 46.0) };
+                card(ui, rect, "beside", align, down, |ui| self.comparison_bar(ui, comparison, rect.width(), cx));
             }
             return;
         }
@@ -131,23 +139,32 @@ impl ViewCards<'_> {
         }
     }
 
-    /// Draws the name of the scene in the second view, and its quality.
-    fn comparison_bar(&self, ui: &mut Ui, comparison: &ComparedScene, cx: &mut Ctx<'_>) {
+    /// Draws the name of the scene in the second view, and its quality, in a view of this width.
+    fn comparison_bar(&self, ui: &mut Ui, comparison: &ComparedScene, view_pt: f32, cx: &mut Ctx<'_>) {
         let state = cx.state;
         let removed = state.removed.as_ref().filter(|r| r.folder == comparison.path);
         let name = removed.map_or_else(|| comparison.name.clone(), |r| format!("without {}", r.name));
         let place = format!("{name}\n{}", comparison.path.display());
-        // The buttons of a removal leave less room.
-        let most = if removed.is_some() { 24 } else { 40 };
+        let psnr =
+            self.display.picture().and_then(|p| p.second.as_ref()?.psnr).filter(|_| view_pt > NARROW_BESIDE_MODES);
+        // The name gets what the buttons leave.
+        let is_wide = view_pt > NARROW_BESIDE_MODES;
+        let buttons_pt = match (&removed, is_wide) {
+            (None, _) => 70.0,
+            (Some(_), false) => 240.0,
+            (Some(_), true) => 480.0,
+        };
+        let room_pt = view_pt - buttons_pt - if psnr.is_some() { 160.0 } else { 0.0 };
+        let most = (room_pt / LETTER_PT).clamp(6.0, 40.0) as usize;
         ui.label(RichText::new(text::elided(&name, most)).strong()).on_hover_text(text::lines(&place));
         if let Some(removed) = removed {
             let open = ui.button("Open").on_hover_text("Go on with this scene. The other one stays where it is.");
             if open.clicked() {
                 cx.ask(Action::Open(removed.folder.clone()));
             }
-            other_fills(ui, &removed.request, cx);
+            other_fills(ui, &removed.request, is_wide, cx);
         }
-        if let Some(psnr) = self.display.picture().and_then(|p| p.second.as_ref()?.psnr) {
+        if let Some(psnr) = psnr {
             ui.colored_label(theme::accent(), psnr_text(psnr));
         }
         let close = ui.button("\u{d7}").on_hover_text(Action::OpenComparison(None).text());
@@ -264,16 +281,20 @@ impl ViewCards<'_> {
     }
 }
 
-/// Draws buttons for further removals; each makes another scene.
-fn other_fills(ui: &mut Ui, last: &RemoveRequest, cx: &mut Ctx<'_>) {
+/// Draws buttons for further removals, in one menu unless there is room; each makes another scene.
+fn other_fills(ui: &mut Ui, last: &RemoveRequest, is_wide: bool, cx: &mut Ctx<'_>) {
     let state = cx.state;
     let options = RemovalOptions { seed: last.options.seed + 1, ..last.options.clone() };
     let mut next = RemoveRequest { options, retrain: false, ..last.clone() };
     let again = Action::AnotherFill(Box::new(next.clone()));
-    if ui.button(again.text()).on_hover_text(again.tooltip()).clicked() {
-        cx.ask(again);
+    if is_wide && ui.button(again.text()).on_hover_text(again.tooltip()).clicked() {
+        cx.ask(again.clone());
     }
     let changed = ui.menu_button("Options", |ui| {
+        if !is_wide && ui.button(again.text()).on_hover_text(again.tooltip()).clicked() {
+            cx.ask(again);
+            ui.close();
+        }
         let options = &mut next.options;
         let mut changed = ui
             .checkbox(&mut options.halo, "With its fringes")

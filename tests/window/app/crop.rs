@@ -70,6 +70,7 @@ fn a_crop_box_is_drawn_inverted_undone_and_exported() {
 
     w.harness.state_mut().layout.folder = Some(folder.path().to_path_buf());
     w.click("Export\u{2026}");
+    w.click("Save\u{2026}");
     w.until("a dialog", |a| a.chooses_file());
     w.click("Save");
     w.until("it is written", |a| a.state.log.iter().any(|l| l.text.starts_with("Saved to ")));

@@ -153,6 +153,7 @@ fn without_a_dialog_of_the_system_files_are_chosen_in_the_window() {
     w.until("a picture", |a| a.viewport.picture().is_some_and(|p| p.full));
     w.harness.state_mut().layout.folder = Some(folder.path().to_path_buf());
     w.ask(Action::ExportPly);
+    w.click("Save\u{2026}");
     w.until("a dialog", |a| a.chooses_file());
     assert!(w.shows("Export Gaussians"));
     let field = |w: &Window| w.harness.query_all_by_role(Role::TextInput).filter_map(|n| n.value()).collect::<Vec<_>>();

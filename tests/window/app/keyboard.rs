@@ -112,9 +112,9 @@ fn all_of_a_session_is_done_by_keys_alone() {
     // Export: the window's own dialog, as the system has none here.
     w.harness.state_mut().layout.folder = Some(folder.path().to_path_buf());
     ctrl(&mut w, Key::E);
+    w.press(Key::Enter);
     w.until("a dialog", |a| a.chooses_file());
-    tab_to(&mut w, Role::Button, "Save");
-    w.press(Key::Space);
+    w.press(Key::Enter);
     w.until("it is written", |a| a.state.log.iter().any(|l| l.text.starts_with("Saved to ")));
 
     // A setting of the next training.
@@ -206,8 +206,14 @@ fn everything_that_can_be_reached_has_a_name() {
     named(&mut w, "a photo beside the rendering");
     w.harness.state_mut().layout.folder = Some(folder.path().to_path_buf());
     w.ask(Action::ExportPly);
+    named(&mut w, "a dialog for Gaussians");
+    w.click("Save\u{2026}");
     w.until("a dialog", |a| a.chooses_file());
     named(&mut w, "a dialog for files");
+    w.press(Key::Escape);
+    w.ask(Action::ExportVideo);
+    assert!(w.shows("1280 \u{d7} 720 px"));
+    named(&mut w, "a dialog for a video");
     w.press(Key::Escape);
 
     report::write_report(&folder.path().join("report"), 1.0, 2);

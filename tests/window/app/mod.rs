@@ -4,6 +4,7 @@ mod crop;
 mod demo;
 mod doubts;
 mod edits;
+mod files;
 mod hands;
 mod kept;
 mod keyboard;

@@ -12,7 +12,8 @@ use crate::pipeline::observer::Observer;
 use crate::scene::{IdentityId, SemanticMap};
 use crate::ui::app::App;
 use crate::ui::dialogs::{DialogAnswer, Question};
-use crate::ui::file_dialogs::FileRequest;
+use crate::ui::file_dialogs::{FileFormat, FileRequest};
+use crate::ui::file_kind::FileKind;
 use crate::ui::find_dialog::Means;
 use crate::ui::history::FoundStep;
 use crate::ui::keep_dialog::{KeepAnswer, KeepDialog, PlannedSearch};
@@ -33,7 +34,7 @@ pub(in crate::ui) fn find(app: &mut App) {
 }
 
 pub(in crate::ui) fn choose_masks(app: &mut App) {
-    app.choose(FileRequest::folder("Choose the folder with the masks"), |app, masks| {
+    app.choose(FileRequest::folder(FileKind::Masks, "Folder with masks"), |app, masks| {
         begin_search(app, PlannedSearch { masks: Some(masks), ..PlannedSearch::default() });
     });
 }
@@ -94,8 +95,9 @@ fn find_after(app: &mut App, mut search: PlannedSearch) {
 }
 
 pub(in crate::ui) fn choose_model_files(app: &mut App, id: String) {
-    let title = format!("Choose the checkpoint of {id}, or the description (.json) of its exported files");
-    let request = FileRequest::file(title, "Networks", &["pt", "pth", "bin", "safetensors", "json"]);
+    let checkpoints = FileFormat::new("Checkpoints", &[".pt", ".pth", ".bin", ".safetensors"]);
+    let formats = vec![checkpoints, FileFormat::new("Descriptions of exported files (.json)", &[".json"])];
+    let request = FileRequest::file(FileKind::Models, &format!("Files of {id}"), formats);
     app.choose(request, |app, path| install_model(app, id, Some(path)));
 }
 
