@@ -154,6 +154,7 @@ impl Action {
         // These need a tool in use.
         all.retain(|a| !matches!(a, Self::AddPainted | Self::ApplyTransform | Self::DeleteChosen));
         all.extend([Self::Isolate(None), Self::SegmentNew(Some(NO_IDENTITY)), Self::SetCrop(None)]);
+        all.push(Self::ShowFolder(None));
         all.extend(ViewMode::VARIANTS.iter().map(|mode| Self::Show(*mode)));
         all.extend(Pane::VARIANTS.iter().map(|pane| Self::ShowPane(*pane)));
         all.extend(THEMES.map(Self::UseTheme));

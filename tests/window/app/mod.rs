@@ -15,6 +15,7 @@ mod queries;
 mod rearranging;
 mod removing;
 mod report;
+mod runs;
 mod selecting;
 mod split;
 mod typing;
