@@ -246,6 +246,22 @@ pub(crate) fn folder_name(folder: &Path) -> String {
     text::name(&real.file_name().unwrap_or(real.as_os_str()).to_string_lossy())
 }
 
+/// Returns whether a folder is called as those of any data set are, so that its name says nothing.
+pub(crate) fn is_usual_name(name: &str) -> bool {
+    const USUAL: [&str; 7] = ["photos", "images", "input", "rgb", "frames", "scene", "undistorted"];
+    USUAL.iter().any(|usual| name.eq_ignore_ascii_case(usual))
+}
+
+/// Name of a data set for display: that of its folder, or of the folder around it where its own says nothing.
+pub(crate) fn data_set_name(root: &Path) -> String {
+    let name = folder_name(root);
+    if !is_usual_name(&name) {
+        return name;
+    }
+    let real = fs::canonicalize(root).unwrap_or_else(|_| root.into());
+    real.parent().and_then(Path::file_name).map_or(name, |around| text::name(&around.to_string_lossy()))
+}
+
 /// Returns the path `now` of something named `earlier` by another version. It is renamed once; if that fails, `earlier`
 /// is used.
 pub(crate) fn renamed(now: PathBuf, earlier: PathBuf) -> PathBuf {
@@ -281,6 +297,18 @@ mod tests {
             assert!(matches!(e, IoError::Outside { .. }), "{entry}: {e}");
         }
         assert_eq!(relative(root, "./images//a.png", source).expect("inside"), "images/a.png");
+    }
+
+    #[test]
+    fn a_data_set_is_called_by_a_folder_that_says_something() {
+        let folder = tempfile::tempdir().expect("folder");
+        for (path, name) in [("fox/photos", "fox"), ("fox/Images", "fox"), ("fox", "fox"), ("fox/photos-2", "photos-2")]
+        {
+            let path = folder.path().join(path);
+            fs::create_dir_all(&path).expect("created");
+            assert_eq!(data_set_name(&path), name, "{}", path.display());
+        }
+        assert_eq!(data_set_name(Path::new("/photos")), "photos", "nothing is around it");
     }
 
     #[cfg(unix)]

@@ -39,7 +39,7 @@ pub fn read(root: &Path) -> Result<Dataset, IoError> {
         rows.iter().zip(&names).map(|(row, name)| listed(row, name, &folder, &file)).collect::<Result<_, _>>()?;
     let mut warnings = Vec::new();
     Ok(Dataset {
-        name: files::folder_name(root),
+        name: files::data_set_name(root),
         root: root.into(),
         format: "LLFF".into(),
         photos: photos(listed, root, &file, &mut warnings)?,

@@ -73,9 +73,23 @@ impl SceneFolder {
         if !names.all(|name| name == folder_lock::FILE || scene_files::FILES.iter().any(|file| name == *file)) {
             return Err(IoError::HoldsMore { folder });
         }
-        // The path is free at once; files left by a killed process are swept later. Windows does not move a folder in
-        // which a file is open.
-        let _held = (!cfg!(windows)).then_some(held);
+        held.take_away()
+    }
+
+    /// Deletes the scene in `folder` with everything else in the folder.
+    ///
+    /// # Errors
+    /// If it is no scene, or another process writes to it; nothing is deleted then.
+    pub(crate) fn delete_all(folder: &Path) -> Result<(), IoError> {
+        load_info(folder)?;
+        Self::hold(folder, "deleting")?.take_away()
+    }
+
+    /// Deletes the folder: its path is free at once; files left by a killed process are swept later.
+    fn take_away(self) -> Result<(), IoError> {
+        let folder = self.path().to_path_buf();
+        // Windows does not move a folder in which a file is open.
+        let _held = (!cfg!(windows)).then_some(self);
         let gone = temporary_folder(files::folder_of(&folder), "deleted");
         gone.and_then(|gone| fs::rename(&folder, gone.folder.path().join("scene"))).map_err(|e| write_error(&folder, e))
     }

@@ -108,6 +108,17 @@ impl SceneInfo {
     }
 }
 
+impl SceneInfo {
+    /// Name of the scene in `folder`: its own, or that of its photos where its own says nothing.
+    pub(crate) fn name_in(&self, folder: &Path) -> String {
+        if !self.name.is_empty() && !files::is_usual_name(&self.name) {
+            return self.name.clone();
+        }
+        let photos = self.dataset.as_ref().map(|dataset| folder.join(&dataset.path)).filter(|path| path.is_dir());
+        files::data_set_name(photos.as_deref().unwrap_or(folder))
+    }
+}
+
 /// Reads `scene.json` alone.
 pub fn load_info(folder: &Path) -> Result<SceneInfo, IoError> {
     #[derive(Deserialize)]

@@ -33,6 +33,8 @@ const VERSION: u64 = 1;
 const KEY: &str = "fmlgs";
 /// Largest file of a semantic map, bytes.
 pub(crate) const MAX_BYTES: u64 = 256 << 20;
+/// Bytes of the length before the header.
+const LENGTH: u64 = 8;
 
 #[derive(Serialize, Deserialize)]
 struct Header {
@@ -93,11 +95,16 @@ pub fn encode(map: &SemanticMap, state: Option<&str>, path: &Path) -> Result<Vec
     safetensors::serialize(tensors, Some(metadata)).map_err(|e| broken(&e))
 }
 
-/// Number of objects and parts stored with the scene in `folder`; 0 if it cannot be read.
-pub(crate) fn count(folder: &Path) -> usize {
+/// Objects and parts stored with the scene in `folder`, without their embeddings; none if they cannot be read.
+pub(crate) fn identities(folder: &Path) -> Identities {
     let path = folder.join(FILE);
-    let header = files::read(&path, MAX_BYTES).and_then(|bytes| header(&path, &bytes));
-    header.map_or(0, |header| header.identities.len())
+    // Embeddings follow the header, and are most of the file.
+    let read = || {
+        let length = files::read_start(&path, LENGTH)?;
+        let length = length.first_chunk().map_or(0, |bytes| u64::from_le_bytes(*bytes));
+        header(&path, &files::read_start(&path, length.saturating_add(LENGTH).min(MAX_BYTES))?)
+    };
+    read().map_or_else(|_| Identities::default(), |header| header.identities)
 }
 
 /// Loads the map of the scene in `folder`, whose Gaussians `cloud` are of the save `state`; `None` if it has none.

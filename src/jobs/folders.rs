@@ -11,6 +11,8 @@ use crate::io::{IoError, atomic, files};
 
 /// Name of a file beside the training runs of a data set; it names the run that was used last.
 const USED: &str = "used-last";
+/// Beginning of the name of a training run's folder, before its number.
+const RUN: &str = "run-";
 
 /// The program's folders, all below one.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -48,12 +50,41 @@ impl Folders {
 
     /// Folders of all training runs of the dataset at `root`, oldest first.
     pub(crate) fn trainings(&self, root: &Path) -> Vec<PathBuf> {
-        self.runs(root).take_while(|run| run.exists()).collect()
+        let mut all: Vec<_> = self.scenes_of(root).into_iter().filter_map(|run| Some((number(&run)?, run))).collect();
+        all.sort();
+        all.into_iter().map(|(_, run)| run).collect()
+    }
+
+    /// Folders of the scenes that edits and the like made of training runs of the dataset at `root`.
+    pub(crate) fn derived(&self, root: &Path) -> Vec<PathBuf> {
+        let mut all = self.scenes_of(root);
+        all.retain(|scene| number(scene).is_none() && is_scene(scene));
+        all.sort();
+        all
+    }
+
+    fn scenes_of(&self, root: &Path) -> Vec<PathBuf> {
+        let all = fs::read_dir(self.all_of(root)).into_iter().flatten().flatten();
+        all.map(|entry| entry.path()).filter(|path| path.is_dir() && !is_hidden(path)).collect()
     }
 
     /// Returns whether a folder is that of a training run.
     pub(crate) fn is_training(&self, run: &Path) -> bool {
-        run.parent().and_then(Path::parent) == Some(self.data.join("trained").as_path())
+        number(run).is_some() && self.keeps(run)
+    }
+
+    /// Returns whether a folder is that of a training run, or of a scene made of one.
+    pub(crate) fn keeps(&self, scene: &Path) -> bool {
+        scene.parent().and_then(Path::parent) == Some(self.data.join("trained").as_path())
+    }
+
+    /// Name of the photos at `root` for display.
+    pub(crate) fn name_of_photos(&self, root: &Path) -> String {
+        let within = root.strip_prefix(&self.data).ok().and_then(|within| within.components().next());
+        match within.is_some_and(|folder| folder.as_os_str().to_string_lossy().starts_with("demo-")) {
+            true => "Demo photos".into(),
+            false => files::data_set_name(root),
+        }
     }
 
     /// Notes that a training run is in use; ignores any other folder.
@@ -72,7 +103,8 @@ impl Folders {
 
     /// Returns a folder for a new training run of the dataset at `root`, next to the earlier ones.
     pub(crate) fn fresh(&self, root: &Path) -> PathBuf {
-        self.runs(root).find(|run| !run.exists()).unwrap_or_default()
+        let last = self.trainings(root).last().and_then(|run| number(run)).unwrap_or(0);
+        self.all_of(root).join(format!("{RUN}{}", last + 1))
     }
 
     /// Folder for a report of the splat at `path`, which has no folder of its own.
@@ -96,11 +128,21 @@ impl Folders {
         unique(&self.data.join("pictures"), path).with_added_extension("png")
     }
 
-    /// Folders of the training runs of the dataset at `root`, in order, without end.
-    fn runs(&self, root: &Path) -> impl Iterator<Item = PathBuf> {
-        let all = unique(&self.data.join("trained"), root);
-        (1..).map(move |n: usize| all.join(format!("run-{n}")))
+    /// Folder of all training runs of the dataset at `root`.
+    fn all_of(&self, root: &Path) -> PathBuf {
+        unique(&self.data.join("trained"), root)
     }
+}
+
+/// Number of a training run, by the name of its folder.
+fn number(run: &Path) -> Option<usize> {
+    let name = run.file_name()?.to_str()?;
+    let number = name.strip_prefix(RUN)?.parse().ok()?;
+    (name == format!("{RUN}{number}")).then_some(number)
+}
+
+fn is_hidden(path: &Path) -> bool {
+    path.file_name().is_some_and(|name| name.to_string_lossy().starts_with('.'))
 }
 
 /// Returns the folder in `parent` that belongs to `path`: named by its last name and a digest of all of it, so that two
@@ -178,6 +220,24 @@ mod tests {
             .and_then(|f| f.set_modified(later))
             .expect("set");
         assert_eq!(folders.trained(root), runs[1]);
+    }
+
+    #[test]
+    fn runs_with_a_gap_are_all_there_in_order_and_no_number_is_used_twice() {
+        let folder = tempfile::tempdir().expect("folder");
+        let folders = Folders { data: folder.path().into() };
+        let root = Path::new("/one/fox");
+        let all = folders.fresh(root).parent().expect("a parent").to_path_buf();
+        for name in ["run-2", "run-10", "run-10-edited", "run-007", "other", ".run-3.fmlgs-1.tmp"] {
+            fs::create_dir_all(all.join(name)).expect("created");
+        }
+        fs::write(all.join("run-10-edited").join(SCENE_FILE), "{}").expect("written");
+        assert_eq!(folders.trainings(root), ["run-2", "run-10"].map(|name| all.join(name)));
+        assert_eq!(folders.fresh(root), all.join("run-11"));
+        assert_eq!(folders.derived(root), [all.join("run-10-edited")], "what is no scene is not shown");
+        let (run, edited) = (all.join("run-2"), all.join("run-10-edited"));
+        assert_eq!([&run, &edited].map(|path| folders.is_training(path)), [true, false]);
+        assert_eq!([&run, &edited, &all].map(|path| folders.keeps(path)), [true, true, false]);
     }
 
     #[test]

@@ -1,12 +1,12 @@
-//! Small pictures of recently opened scenes, for the start page of the window.
+//! Recently opened scenes, for the start page of the window: their names, training runs and small pictures.
 
 use std::path::{Path, PathBuf};
 
+use super::runs::{self, RunSummary};
 use super::{Folders, JobError, export};
-use crate::io::{IoError, files, semantic_map, trained};
-use crate::math::format;
+use crate::io::{IoError, files, trained};
 use crate::math::resize::{Filter, resize};
-use crate::scene::PhotoPixels;
+use crate::scene::{PhotoPixels, text};
 
 /// Longer side of a kept picture, px.
 const SIDE_PX: f64 = 320.0;
@@ -45,50 +45,34 @@ pub(crate) fn load(folders: &Folders, of: Vec<PathBuf>) -> Vec<(PathBuf, PhotoPi
     of.into_iter().filter_map(|path| Some((read(&path).ok()?, path))).map(|(pixels, path)| (path, pixels)).collect()
 }
 
-/// Summary of a training run, for lists.
+/// A recently opened scene or data set.
 #[derive(Clone, Debug, PartialEq)]
-pub struct RunSummary {
-    /// Its folder.
-    pub folder: PathBuf,
-    /// Number of finished steps.
-    pub steps: u64,
-    /// Number of objects and parts stored with it.
-    pub objects: usize,
-    psnr: Option<f64>,
+pub struct RecentScene {
+    /// Its path.
+    pub path: PathBuf,
+    /// Its own name.
+    pub name: String,
+    /// Training runs of the photos, and what was made of them.
+    pub runs: Vec<RunSummary>,
 }
 
-impl RunSummary {
-    /// Returns text such as "run-1: 600 steps, 26.6 dB, 13 objects and parts".
-    pub(crate) fn text(&self) -> String {
-        let name = self.folder.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
-        let quality = self.psnr.map_or_else(String::new, |psnr| format!(", {psnr:.1} dB"));
-        let objects = match self.objects {
-            0 => "no objects".to_owned(),
-            1 => "1 object".to_owned(),
-            n => format!("{n} objects and parts"),
+impl RecentScene {
+    /// Reads what is known of the scene at `path`; of one that is not there, its file's name.
+    pub(crate) fn of(folders: &Folders, path: PathBuf) -> Self {
+        let is_file = path.is_file();
+        // Photos may have been opened by the file that lists them.
+        let root = if is_file { files::folder_of(&path) } else { &path };
+        let own = runs::list(folders, &path);
+        let runs = if own.is_empty() && is_file { runs::list(folders, root) } else { own };
+        let name = match trained::load_info(&path) {
+            Ok(info) => info.name_in(&path),
+            Err(_) if is_file && runs.is_empty() => {
+                path.file_stem().map(|stem| text::name(&stem.to_string_lossy())).unwrap_or_default()
+            }
+            Err(_) => folders.name_of_photos(root),
         };
-        format!("{name}: {}{quality}, {objects}", format::things(self.steps as usize, "step"))
+        Self { path, name, runs }
     }
-}
-
-/// Returns the training runs of the photos at `path`, oldest first. Unreadable ones are left out.
-pub(crate) fn runs(folders: &Folders, path: &Path) -> Vec<RunSummary> {
-    let summary = |folder: PathBuf| {
-        let info = trained::load_info(&folder).ok()?;
-        let last = info.history.evaluations.last();
-        let steps = info.history.steps.last().map(|s| s.step).or(last.map(|e| e.step)).unwrap_or(0);
-        let psnr = last.map(|e| e.psnr).filter(|psnr| psnr.is_finite());
-        Some(RunSummary { objects: semantic_map::count(&folder), folder, steps, psnr })
-    };
-    folders.trainings(path).into_iter().filter_map(summary).collect()
-}
-
-/// Returns the training runs of these photos, for photos with several.
-pub(crate) fn several(folders: &Folders, of: Vec<PathBuf>) -> Vec<(PathBuf, Vec<RunSummary>)> {
-    // Photos may have been opened by the file that lists them.
-    let root = |path: &Path| if path.is_file() { files::folder_of(path).to_path_buf() } else { path.to_path_buf() };
-    let all = of.into_iter().map(|path| (runs(folders, &root(&path)), path)).map(|(runs, path)| (path, runs));
-    all.filter(|(_, runs)| runs.len() > 1).collect()
 }
 
 #[cfg(test)]

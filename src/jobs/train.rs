@@ -84,7 +84,7 @@ pub(crate) fn run(
     let mut earlier: Option<(String, PathBuf)> = None;
     while let Some(out) = folders.next() {
         if let Some(earlier) = earlier.take() {
-            let objects = match semantic_map::count(&earlier.1) {
+            let objects = match semantic_map::identities(&earlier.1).len() {
                 0 => String::new(),
                 n => format!(", with its {}", things(n, "object or part")),
             };

@@ -9,7 +9,7 @@ use super::edit::{self, EditRequest};
 use super::evaluate::{self, EvaluateOptions, PhotoComparison};
 use super::find_objects::{self, FindRequest};
 use super::rearrange::{self, RearrangeRequest, RearrangedScene};
-use super::recent::{self, RunSummary};
+use super::runs::{self, RunSummary};
 use super::train::{self, TrainStart, Trained};
 use super::{Folders, JobError, OpenedScene, Scene, demo, open, plan, poses, report, scale};
 use crate::io::unposed::Unposed;
@@ -132,7 +132,7 @@ impl Workspace {
         let cloud = &outcome.cloud;
         let facts = plan::facts(self.machine(), Some(dataset), Some((cloud, cloud.sh_degree)), config);
         let facts = facts.with_semantics(semantics.as_deref());
-        let runs = recent::runs(&self.folders, &dataset.root);
+        let runs = runs::list(&self.folders, dataset.source());
         let evaluations = outcome.evaluations;
         Ok(TrainingEnd::Trained(Box::new(TrainedRun { evaluations, out, semantics, runs, stopped_at, facts })))
     }

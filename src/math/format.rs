@@ -185,6 +185,25 @@ pub(crate) fn share(v: f64) -> String {
     }
 }
 
+/// A time that has passed: "2 h ago", "3 days ago"; the day if that is longer ago.
+pub(crate) fn ago(time: SystemTime, now: SystemTime) -> String {
+    let minutes = now.duration_since(time).map_or(0, |d| d.as_secs() / 60);
+    match minutes {
+        0 => "just now".into(),
+        1..60 => format!("{minutes} min ago"),
+        60..1_440 => format!("{} h ago", minutes / 60),
+        1_440..2_880 => "1 day ago".into(),
+        2_880..20_160 => format!("{} days ago", minutes / 1_440),
+        _ => date(time),
+    }
+}
+
+/// A moment in Greenwich: "2026-02-28, 13:05 UTC".
+pub(crate) fn moment(time: SystemTime) -> String {
+    let minutes = time.duration_since(SystemTime::UNIX_EPOCH).map_or(0, |d| d.as_secs() / 60) % 1_440;
+    format!("{}, {:02}:{:02} UTC", date(time), minutes / 60, minutes % 60)
+}
+
 /// The day of a moment in Greenwich: "2026-02-28". Howard Hinnant's days-to-civil: years that begin in March.
 pub(crate) fn date(time: SystemTime) -> String {
     let days = time.duration_since(SystemTime::UNIX_EPOCH).map_or(0, |d| d.as_secs() / 86_400) + 719_468;
@@ -213,6 +232,17 @@ mod tests {
     fn guesses_are_round() {
         let guesses = [3.0, 84.0, 880.0, 5_500.0, 9_000.0, f64::NAN].map(about);
         assert_eq!(guesses, ["10 s", "90 s", "about 15 min", "about 1.5 h", "about 2.5 h", "–"]);
+    }
+
+    #[test]
+    fn what_is_past_is_told_by_how_long_ago_it_was() {
+        let at = |secs: u64| SystemTime::UNIX_EPOCH + std::time::Duration::from_secs(secs);
+        let now = at(20_819 * 86_400 + 47_100);
+        let told = [0, 59, 60, 7_199, 86_400, 172_800, 1_209_600]
+            .map(|secs| ago(now - at(secs).duration_since(at(0)).expect("later"), now));
+        assert_eq!(told, ["just now", "just now", "1 min ago", "1 h ago", "1 day ago", "2 days ago", "2026-12-18"]);
+        assert_eq!(ago(now + std::time::Duration::from_secs(9), now), "just now", "clocks differ");
+        assert_eq!(moment(now), "2027-01-01, 13:05 UTC");
     }
 
     #[test]

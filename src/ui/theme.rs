@@ -260,6 +260,12 @@ pub(crate) fn card<T>(ctx: &egui::Context, area: Area, add: impl FnOnce(&mut Ui)
     within(ctx, THEME.get(), || area.show(ctx, |ui| overlay().show(ui, add).inner))
 }
 
+/// UV rectangle of the centered part of an image that fills a place.
+pub(crate) fn filling(picture: egui::Vec2, place: egui::Vec2) -> egui::Rect {
+    let scale = (place.x / picture.x.max(1.0)).max(place.y / picture.y.max(1.0));
+    egui::Rect::from_center_size(egui::pos2(0.5, 0.5), place / (picture.max(egui::Vec2::splat(1.0)) * scale))
+}
+
 /// The translucent frame of a card.
 pub(crate) fn overlay() -> egui::Frame {
     egui::Frame::new()
@@ -281,6 +287,15 @@ mod tests {
         };
         let (a, b) = (luminance(a), luminance(b));
         (a.max(b) + 0.05) / (a.min(b) + 0.05)
+    }
+
+    #[test]
+    fn a_picture_fills_its_place_undistorted() {
+        let uv = filling(vec2(400.0, 300.0), vec2(200.0, 100.0));
+        assert!((uv.width() - 1.0).abs() < 1e-6 && (uv.height() - 2.0 / 3.0).abs() < 1e-6, "{uv:?}");
+        let uv = filling(vec2(100.0, 300.0), vec2(200.0, 100.0));
+        assert!((uv.width() - 1.0).abs() < 1e-6 && (uv.height() - 1.0 / 6.0).abs() < 1e-6, "{uv:?}");
+        assert_eq!(uv.center(), egui::pos2(0.5, 0.5));
     }
 
     #[test]

@@ -75,7 +75,7 @@ pub fn read(root: &Path) -> Result<Dataset, IoError> {
     }
 
     Ok(Dataset {
-        name: files::folder_name(root),
+        name: files::data_set_name(root),
         root: root.into(),
         source: (root != opened).then(|| opened.into()),
         format: if model.is_binary { "COLMAP binary" } else { "COLMAP text" }.into(),

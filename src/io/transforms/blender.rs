@@ -46,7 +46,7 @@ pub fn read_blender(root: &Path) -> Result<Dataset, IoError> {
     }
     let points = points_ply::beside(root).map(|path| points_ply::read(&path)).transpose()?.unwrap_or_default();
     Ok(Dataset {
-        name: files::folder_name(root),
+        name: files::data_set_name(root),
         root: root.into(),
         format: "Blender synthetic".into(),
         photos: all,

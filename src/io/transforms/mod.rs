@@ -121,7 +121,7 @@ pub fn read(file: &Path) -> Result<Dataset, IoError> {
         },
     };
     Ok(Dataset {
-        name: files::folder_name(root),
+        name: files::data_set_name(root),
         root: root.into(),
         source: file.file_name().is_some_and(|name| name != USUAL).then(|| file.into()),
         format: "transforms.json".into(),

@@ -90,7 +90,6 @@ pub(crate) fn picture() -> Result<Vec<u8>, IoError> {
 /// As [`unpacked()`] and [`open::open`].
 pub(crate) fn open(folders: &Folders, machine: &Machine, observer: &mut dyn Observer) -> Result<OpenedScene, JobError> {
     let mut scene = open::open(&unpacked(folders, observer)?.join("scene"), folders, machine, observer)?;
-    call(&mut scene, "Demo");
     let photo = scene.dataset.as_ref().and_then(|d| d.photos.get(DemoRecipe::shipped().home));
     scene.home.camera = photo.map(|p| p.camera.clone()).or(scene.home.camera);
     Ok(scene)
@@ -107,17 +106,7 @@ pub(crate) fn open_photos(
 ) -> Result<OpenedScene, JobError> {
     let out = folders.demo();
     photograph(&out, &demo::demo_options(), observer)?;
-    let mut scene = open::open(&out, folders, machine, observer)?;
-    call(&mut scene, "Demo photos");
-    Ok(scene)
-}
-
-/// Gives a scene a name that differs from its folder's.
-fn call(scene: &mut OpenedScene, name: &str) {
-    scene.scene.name = name.into();
-    if let Some(dataset) = scene.dataset.as_mut().map(Arc::make_mut) {
-        dataset.name = name.into();
-    }
+    open::open(&out, folders, machine, observer)
 }
 
 /// Compares the trained demo with its held-out photos and asks its queries; heat maps go to `pictures`.
@@ -199,6 +188,7 @@ pub(crate) fn make(
     let frame = Renderer::new().render(&cloud, Features::NONE, &home, &settings)?;
     let rgb = image::RgbImage::from_raw(PICTURE_PX[0], PICTURE_PX[1], frame.to_rgb8().into_flattened());
 
+    info.name = "Demo".into();
     info.dataset = Some(DatasetReference { path: "../photos".into(), format: dataset.format.clone() });
     // Times differ from run to run.
     let last = crate::scene::Evaluation { step: outcome.steps, ..quality };

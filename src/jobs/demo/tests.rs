@@ -190,3 +190,30 @@ fn what_is_damaged_is_unpacked_again_and_what_was_there_is_kept() {
     unpacked(&folders, &mut notes).expect("sound");
     assert!(notes.0.is_empty());
 }
+
+#[test]
+fn zz_repack() {
+    let path = Path::new(NAME);
+    let all: Vec<(String, Vec<u8>)> = bundle::sizes(BUNDLE, path)
+        .expect("list")
+        .into_iter()
+        .map(|(name, _)| {
+            let mut bytes = bundle::read(BUNDLE, &name, path).expect("read");
+            if name == "scene/scene.json" {
+                let text = String::from_utf8(bytes).expect("text");
+                assert_eq!(text.matches("\"name\":\"photos\"").count(), 1);
+                bytes = text.replace("\"name\":\"photos\"", "\"name\":\"Demo\"").into_bytes();
+            }
+            (name, bytes)
+        })
+        .collect();
+    let same = bundle::sizes(BUNDLE, path)
+        .expect("list")
+        .into_iter()
+        .map(|(name, _)| (name.clone(), bundle::read(BUNDLE, &name, path).expect("read")))
+        .collect::<Vec<_>>();
+    println!("identical repack: {}", bundle::pack(&same).expect("packed") == BUNDLE);
+    let bytes = bundle::pack(&all).expect("packed");
+    std::fs::write("assets/demo/demo.zip.new", &bytes).expect("written");
+    std::fs::write("assets/demo/demo.sha256.new", format!("{}  demo.zip\n", digest(&bytes))).expect("written");
+}

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use super::held_out::held_out;
-use super::recent::{self, RunSummary};
+use super::runs::{self, RunSummary};
 use super::sparse_cloud::sparse_cloud;
 use super::{Folders, JobError, measurements, plan};
 use crate::io::labels::Labels;
@@ -121,6 +121,7 @@ impl Scene {
 
     fn trained(path: &Path, scene: TrainedScene, config: TrainConfig) -> Self {
         let dataset_path = scene.dataset_path();
+        let name = scene.info.name_in(&scene.folder);
         let TrainedScene { folder, info, mut cloud, state } = scene;
         let (_, extent) = Camera::extent_of(info.cameras.iter().map(|c| &c.camera));
         // Cloud files of earlier versions do not say it.
@@ -134,7 +135,7 @@ impl Scene {
         Self {
             path: path.into(),
             folder: Some(folder),
-            name: info.name,
+            name,
             cloud,
             sh_stored,
             cameras: info.cameras,
@@ -314,25 +315,25 @@ pub(crate) fn open(
     let path = &beside::splat_of(&std::path::absolute(path).unwrap_or_else(|_| path.to_path_buf()));
     let mut at = path.clone();
     let mut opened = match io::open(path)? {
-        Opened::Dataset(dataset) => photos(dataset, folders, observer),
+        Opened::Dataset(dataset) => photos(named(dataset, folders), folders, observer),
         Opened::Cloud(cloud) => {
             let scene = Scene::bare(path, cloud);
             let seen = scene.dataset_path.is_some().then(|| photos_of(&scene, observer)).flatten();
-            let dataset = seen.or_else(|| beside::photos_unseen(&scene).map(Arc::new));
+            let dataset = seen.or_else(|| beside::photos_unseen(&scene)).map(Arc::new);
             OpenedScene::of(scene, dataset, observer)
         }
         Opened::Trained(trained) => {
             let scene = tolerant(path, trained, observer);
-            let dataset = photos_of(&scene, observer);
+            let dataset = photos_of(&scene, observer).map(|dataset| Arc::new(named(dataset, folders)));
             if let Some(dataset) = dataset.as_ref().filter(|_| folders.is_training(path)) {
                 // One of several training runs of these photos, by which the user knows it.
-                at.clone_from(&dataset.root);
+                at = dataset.source().to_path_buf();
             }
             OpenedScene::of(scene, dataset, observer)
         }
     };
     opened.scene.path = at;
-    opened.runs = opened.dataset.as_ref().map_or_else(Vec::new, |d| recent::runs(folders, &d.root));
+    opened.runs = opened.dataset.as_ref().map_or_else(Vec::new, |d| runs::list(folders, d.source()));
     if let Some(text) = objects_elsewhere(&opened) {
         observer.note(Severity::Warning, text);
     }
@@ -346,6 +347,11 @@ pub(crate) fn open(
     let facts = plan::facts(machine, opened.dataset.as_deref(), cloud, &TrainConfig::default());
     opened.facts = facts.with_semantics(opened.semantics.as_deref());
     Ok(opened)
+}
+
+/// Gives photos the name by which they are shown.
+fn named(dataset: Dataset, folders: &Folders) -> Dataset {
+    Dataset { name: folders.name_of_photos(&dataset.root), ..dataset }
 }
 
 /// Opens photos, with the Gaussians that were trained on them before, if there are any.

@@ -18,7 +18,7 @@ pub(super) fn objects_elsewhere(scene: &OpenedScene) -> Option<String> {
     }
     let other = scene.runs.iter().max_by_key(|run| run.objects).filter(|run| run.objects > 0)?;
     Some(format!(
-        "This training has no objects; an earlier one of these photos has ({}). Open it in the Training pane, or at {}",
+        "This training has no objects; an earlier one of these photos has ({}). Open it in the Photos pane, or at {}",
         other.text(),
         other.folder.display()
     ))
@@ -57,10 +57,10 @@ pub(super) fn tolerant(path: &Path, scene: TrainedScene, observer: &mut dyn Obse
 }
 
 /// Loads the photos of a trained scene, if they still exist.
-pub(super) fn photos_of(scene: &Scene, observer: &mut dyn Observer) -> Option<Arc<Dataset>> {
+pub(super) fn photos_of(scene: &Scene, observer: &mut dyn Observer) -> Option<Dataset> {
     let why = match scene.dataset_path.as_deref().map(|p| (io::open(p), p)) {
         Some((Ok(Opened::Dataset(dataset)), _)) => {
-            return Some(Arc::new(dataset.with_alpha(scene.config.alpha).into_owned()));
+            return Some(dataset.with_alpha(scene.config.alpha).into_owned());
         }
         Some((Ok(_), p)) => format!("{} no longer holds photos; the scene opens without them", p.display()),
         Some((Err(e), _)) => format!("The photos cannot be read, the scene opens without them: {e}"),

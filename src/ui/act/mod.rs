@@ -11,6 +11,7 @@ pub(super) mod objects;
 pub(super) mod open;
 pub(super) mod query;
 pub(super) mod remote;
+pub(super) mod runs;
 pub(super) mod train;
 pub(super) mod view;
 pub(super) mod window;

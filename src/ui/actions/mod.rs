@@ -172,6 +172,7 @@ impl Action {
             Self::SegmentNew(Some(NO_IDENTITY)),
             Self::SetCrop(None),
             Self::Turntable(None),
+            Self::ShowFolder(None),
         ]);
         all.extend(ViewMode::VARIANTS.iter().map(|mode| Self::Show(*mode)));
         all.extend(Pane::VARIANTS.iter().map(|pane| Self::ShowPane(*pane)));

@@ -13,6 +13,7 @@ macro_rules! action_table {
             OpenFile: "Open file\u{2026}", "A splat (.ply, .sog, .gltf, .glb), a transforms.json, or the scene.json of a trained scene."
                 => open::choose_file(app);
             Open(path: PathBuf): format!("Open {}", path.display()), "Open this path." => open::open(app, path);
+            OpenLast: "Open the last scene", "The scene or data set that was open most recently." => runs::open_last(app);
             FindPoses(photos: Box<Unposed>): format!("Find the camera poses of {}", photos.folder.display()),
                 "Run COLMAP on the photos, in a folder of its own, and open the result." => open::find_poses(app, photos);
             Connect(url: String): "Connect to another computer",
@@ -29,6 +30,17 @@ macro_rules! action_table {
             ExportPage: "Export page\u{2026}",
                 "One .html that opens in any browser without a server: to orbit, with names to click and camera paths."
                 => export::page(app);
+            SaveCopy: "Save a copy of the scene\u{2026}",
+                "Copy its folder to another place: Gaussians, objects, settings, camera paths, measurements."
+                => runs::save_copy(app);
+            ShowFolder(of: Option<PathBuf>): of.as_ref().map_or_else(|| "Show the scene in its folder".into(),
+                    |p| format!("Show {} in its folder", p.display())), "Open the folder in the system's file manager."
+                => runs::show_folder(app, ctx, of);
+            RenameRun(run: PathBuf, name: String): format!("Rename the training to {name}"),
+                "Give the training another name; its folder stays where it is." => runs::rename(app, run, name);
+            DeleteRun(run: PathBuf): format!("Delete the training {}\u{2026}", run.display()),
+                "Delete this training with its Gaussians and objects. The photos and the other trainings stay."
+                => runs::ask_to_delete(app, run);
             Screenshot: "Save the view as .png\u{2026}", "Write the image in the viewport, without the drawn cameras.", "Ctrl+S"
                 => export::screenshot(app);
             StartTraining: "Start training",

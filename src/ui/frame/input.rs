@@ -37,6 +37,9 @@ pub(super) fn take(app: &mut App, ctx: &Context) {
             app.actions.push(Action::KeepMeasurement);
         }
         for action in keys::pressed(ctx) {
+            // Without a scene there is nothing to talk about.
+            let opens_last = action == Action::StartChat && app.state.scene.is_none() && app.state.job.is_none();
+            let action = if opens_last { Action::OpenLast } else { action };
             if keys::opens_field(&action) {
                 // Before drawing: text typed in this frame belongs to the field.
                 keys::begin_typing(ctx);

@@ -77,8 +77,11 @@ fn take_news(app: &mut App, ctx: &egui::Context) {
     query::send_chat(app);
     view::play(app, ctx);
     let App { state, viewport, tasks, workspace, .. } = app;
-    app.first_page.update(ctx, state, viewport, tasks, workspace);
+    if app.first_page.update(ctx, state, viewport, tasks, workspace) {
+        app.photos.runs.refresh();
+    }
     app.photos.update(ctx, state);
+    app.photos.runs.update(ctx, state, tasks, workspace);
     app.thumbnails.update(ctx, state, viewport.cloud().map(|c| &**c), tasks);
     app.models.update(state);
     if app.layout.shows(Pane::Training) {

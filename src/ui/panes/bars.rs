@@ -42,12 +42,13 @@ pub(crate) fn top(ui: &mut Ui, cx: &mut Ctx<'_>, view: &Viewport) {
                     ui.weak("Nothing yet");
                 }
                 for path in &state.recent {
-                    let text = text::elided(&path.to_string_lossy(), 60);
-                    if ui.button(text).clicked() {
+                    let known = state.recent_scenes.iter().find(|known| known.path == *path);
+                    let name = known.map_or_else(|| text::path(path), |known| known.name.clone());
+                    let place = text::elided(&path.to_string_lossy(), 48);
+                    if ui.add(Button::new(text::elided(&name, 40)).shortcut_text(place)).clicked() {
                         cx.ask(Action::Open(path.clone()));
                     }
-                    let runs = state.recent_runs.iter().find(|(of, _)| of == path);
-                    for run in runs.into_iter().flat_map(|(_, runs)| runs) {
+                    for run in known.map_or(&[][..], |known| &known.runs) {
                         if ui.button(format!("{INDENT}{}", run.text())).clicked() {
                             cx.ask(Action::Open(run.folder.clone()));
                         }
@@ -60,6 +61,9 @@ pub(crate) fn top(ui: &mut Ui, cx: &mut Ctx<'_>, view: &Viewport) {
             item(ui, state.semantics.is_some(), None, Action::ExportAll, cx);
             item(ui, has_scene, None, Action::ExportPage, cx);
             item(ui, has_scene, None, Action::Screenshot, cx);
+            ui.separator();
+            item(ui, has_scene, None, Action::SaveCopy, cx);
+            item(ui, has_scene, None, Action::ShowFolder(None), cx);
             ui.separator();
             item(ui, true, None, Action::Quit, cx);
         });
@@ -158,7 +162,7 @@ pub(crate) fn top(ui: &mut Ui, cx: &mut Ctx<'_>, view: &Viewport) {
         });
         if let Some(scene) = &state.scene {
             ui.separator();
-            ui.label(RichText::new(&scene.name).strong()).on_hover_text(text::path(&scene.path));
+            ui.label(RichText::new(&scene.name).strong()).on_hover_text(text::path(scene.stored()));
             if let Some(origin) = &scene.remote {
                 ui.label(RichText::new(format!("on {}", origin.host)).color(theme::weak()));
             }

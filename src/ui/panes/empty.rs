@@ -5,8 +5,8 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use egui::{
-    Align2, Button, Color32, ColorImage, FontId, Image, ProgressBar, Rect, RichText, ScrollArea, Sense, Shape, Stroke,
-    TextureHandle, TextureOptions, Ui, Vec2, vec2,
+    Align2, Button, Color32, ColorImage, CornerRadius, FontId, Image, ProgressBar, RichText, ScrollArea, Sense, Shape,
+    Stroke, TextureHandle, TextureOptions, Ui, Vec2, vec2,
 };
 
 use super::super::ctx::Ctx;
@@ -14,10 +14,11 @@ use super::super::state::{AppState, RunningJob};
 use super::super::viewport::Viewport;
 use super::super::{keys, theme};
 use crate::jobs::demo;
-use crate::jobs::recent::{self, RunSummary};
+use crate::jobs::recent::{self, RecentScene};
+use crate::jobs::runs::RunSummary;
 use crate::jobs::workspace::Workspace;
 use crate::math::format;
-use crate::pipeline::observer::Severity;
+use crate::pipeline::observer::{Observer, Severity};
 use crate::scene::{PhotoPixels, text};
 use crate::ui::actions::Action;
 use crate::worker::{JobInfo, Stop, Task, Tasks};
@@ -27,9 +28,8 @@ const WIDTH: f32 = 760.0;
 /// Recent scenes on the page.
 const RECENT: usize = 6;
 const COLUMNS: usize = 3;
-
-/// Trainings of recent photos.
-type RecentRuns = Vec<(PathBuf, Vec<RunSummary>)>;
+/// Radius of a card's corners, points.
+const CARD_RADIUS: u8 = 8;
 
 /// The first page and its images.
 #[derive(Default)]
@@ -38,17 +38,18 @@ pub(crate) struct FirstPage {
     asked: bool,
     /// Request for images of recent scenes.
     pictures: Option<Task<Vec<(PathBuf, PhotoPixels)>>>,
-    /// Recent scenes whose trainings were requested, and the request.
-    listed: Vec<PathBuf>,
-    runs: Option<Task<RecentRuns>>,
+    /// Recent scenes whose names and trainings were requested, with those of the open one, and the request.
+    listed: Option<(Vec<PathBuf>, Vec<RunSummary>)>,
+    listing: Option<Task<Vec<RecentScene>>>,
     demo: Option<TextureHandle>,
     recent: BTreeMap<PathBuf, TextureHandle>,
-    /// Number of the scene whose image was stored last.
-    kept_for: u64,
+    /// What the image that was stored last is of: number of the scene, its folder, and whether it is trained.
+    kept_for: (u64, PathBuf, bool),
+    keeping: Option<Task<()>>,
 }
 
 impl FirstPage {
-    /// Requests the images once, takes them over, and stores one of the current scene.
+    /// Requests the images once, takes them over, and stores one of the current scene. Returns true once it is stored.
     pub(crate) fn update(
         &mut self,
         ctx: &egui::Context,
@@ -56,7 +57,7 @@ impl FirstPage {
         viewport: &Viewport,
         tasks: &Tasks,
         workspace: &Arc<Workspace>,
-    ) {
+    ) -> bool {
         let texture = |name: &str, size: [u32; 2], rgb: &[u8]| {
             let image = ColorImage::from_rgb(size.map(|s| s as usize), rgb);
             ctx.load_texture(name, image, TextureOptions::LINEAR)
@@ -72,28 +73,50 @@ impl FirstPage {
                 self.pictures = tasks.spawn(info, move |_| Ok::<_, Stop>(recent::load(workspace.folders(), of))).ok();
             }
         }
-        if self.listed != state.recent {
-            self.listed.clone_from(&state.recent);
+        let listed = (state.recent.clone(), state.scene.as_ref().map_or_else(Vec::new, |s| s.runs.clone()));
+        if self.listed.as_ref() != Some(&listed) {
             let (workspace, of) = (Arc::clone(workspace), state.recent.clone());
-            let info = JobInfo::short("Listing trainings of recent photos");
-            self.runs = tasks.spawn(info, move |_| Ok::<_, Stop>(recent::several(workspace.folders(), of))).ok();
+            let list = move |_: &mut dyn Observer| {
+                Ok::<_, Stop>(of.into_iter().map(|path| RecentScene::of(workspace.folders(), path)).collect())
+            };
+            self.listing = tasks.spawn(JobInfo::short("Listing recent scenes"), list).ok();
+            self.listed = Some(listed);
         }
-        if let Some(Ok(runs)) = Task::take(&mut self.runs) {
-            state.recent_runs = runs;
+        if let Some(Ok(scenes)) = Task::take(&mut self.listing) {
+            state.recent_scenes = scenes;
         }
         for (path, p) in Task::take(&mut self.pictures).and_then(Result::ok).into_iter().flatten() {
             let shown = texture(&path.to_string_lossy(), [p.width_px, p.height_px], p.rgb.as_flattened());
             self.recent.insert(path, shown);
         }
-        let Some(scene) = state.scene.as_ref().filter(|_| self.kept_for != state.scene_number) else { return };
-        if viewport.picture().is_some_and(|p| p.full)
-            && let Ok(Some(pixels)) = viewport.pixels()
-        {
-            self.kept_for = state.scene_number;
-            if state.recent.contains(&scene.path) {
-                keep_picture(scene.path.clone(), pixels, tasks, workspace);
-            }
+        self.keep_picture(state, viewport, tasks, workspace);
+        Task::take(&mut self.keeping).is_some()
+    }
+
+    /// Stores an image of the open scene for lists, and again once it is trained.
+    fn keep_picture(&mut self, state: &AppState, viewport: &Viewport, tasks: &Tasks, workspace: &Arc<Workspace>) {
+        let Some(scene) = state.scene.as_ref().filter(|_| !state.is_training()) else { return };
+        let now = (state.scene_number, scene.out.clone(), state.is_trained());
+        if self.kept_for == now || viewport.picture().is_none_or(|p| !p.full) {
+            return;
         }
+        let Ok(Some(pixels)) = viewport.pixels() else { return };
+        self.kept_for = now;
+        let recent = Some(&scene.path).filter(|path| state.recent.contains(path));
+        let run = Some(&scene.out).filter(|out| workspace.folders().keeps(out) && state.is_trained());
+        let of: Vec<PathBuf> = recent.into_iter().chain(run).cloned().collect();
+        let workspace = Arc::clone(workspace);
+        let keep = move |observer: &mut dyn Observer| {
+            for of in of {
+                // A full disk is no error here: the user did not ask for this record.
+                if let Err(e) = recent::keep(workspace.folders(), &of, &pixels) {
+                    observer.note(Severity::Warning, e.to_string());
+                }
+            }
+            Ok::<_, Stop>(())
+        };
+        let info = JobInfo::short(format!("Saving the thumbnail of {}", scene.name)).aside();
+        self.keeping = tasks.spawn(info, keep).ok();
     }
 
     /// Draws the page.
@@ -163,26 +186,28 @@ impl FirstPage {
             return;
         }
         ui.add_space(18.0);
-        ui.label(RichText::new("Recent").small().strong().color(theme::weak()));
+        ui.horizontal(|ui| {
+            ui.label(RichText::new("Recent").small().strong().color(theme::weak()));
+            ui.label(RichText::new("Enter opens the first").small().color(theme::weak()));
+        });
         let gap = 10.0;
         let size = vec2((width - gap * (COLUMNS - 1) as f32) / COLUMNS as f32, 0.23 * width);
         for row in state.recent.iter().take(RECENT).collect::<Vec<_>>().chunks(COLUMNS) {
             ui.horizontal(|ui| {
                 ui.spacing_mut().item_spacing = vec2(gap, gap);
                 for path in row {
-                    if self.card(ui, path, size) {
+                    let known = state.recent_scenes.iter().find(|known| known.path == **path);
+                    if self.card(ui, path, known, size) {
                         cx.ask(Action::Open((*path).clone()));
                     }
                 }
             });
             ui.add_space(gap - 4.0);
         }
-        for (path, runs) in &state.recent_runs {
-            let name = text::path(path.file_name().map_or(path, Path::new));
+        for RecentScene { name, runs, .. } in state.recent_scenes.iter().filter(|known| known.runs.len() > 1) {
             ui.horizontal_wrapped(|ui| {
-                ui.label(
-                    RichText::new(format!("{name} was trained {} times:", runs.len())).small().color(theme::weak()),
-                );
+                let text = format!("{name} was trained {} times:", runs.len());
+                ui.label(RichText::new(text).small().color(theme::weak()));
                 for run in runs {
                     if ui.link(RichText::new(run.text()).small()).clicked() {
                         cx.ask(Action::Open(run.folder.clone()));
@@ -192,51 +217,42 @@ impl FirstPage {
         }
     }
 
-    /// Draws a recent scene: image, name, path. Returns true if it was clicked.
-    fn card(&self, ui: &mut Ui, path: &Path, size: Vec2) -> bool {
-        let name = text::path(path.file_name().map_or(path, Path::new));
+    /// Draws a recent scene: image, name, and its training, its number of trainings or its folder. Returns true if it
+    /// was clicked.
+    fn card(&self, ui: &mut Ui, path: &Path, known: Option<&RecentScene>, size: Vec2) -> bool {
+        let file = || text::path(path.file_name().map_or(path, Path::new));
+        let name = known.map_or_else(file, |known| known.name.clone());
         let (rect, response) = ui.allocate_exact_size(size, Sense::click());
         let response = response.on_hover_text(text::path(path)).on_hover_cursor(egui::CursorIcon::PointingHand);
         let label = name.clone();
         response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Button, true, &label));
         let painter = ui.painter().with_clip_rect(rect);
-        painter.rect_filled(rect, 8.0, theme::surface());
+        painter.rect_filled(rect, CARD_RADIUS, theme::surface());
         if let Some(texture) = self.recent.get(path) {
-            Image::new(texture).uv(filling(texture.size_vec2(), size)).corner_radius(8).paint_at(ui, rect);
+            let uv = theme::filling(texture.size_vec2(), size);
+            Image::new(texture).uv(uv).corner_radius(CARD_RADIUS).paint_at(ui, rect);
         }
         let bar = rect.with_min_y(rect.max.y - 40.0);
-        painter.rect_filled(bar, 0.0, Color32::from_black_alpha(170));
+        let below = CornerRadius { nw: 0, ne: 0, sw: CARD_RADIUS, se: CARD_RADIUS };
+        painter.rect_filled(bar, below, Color32::from_black_alpha(170));
         let at = bar.left_top() + vec2(10.0, 5.0);
         let letters = (size.x / 7.5) as usize;
         painter.text(at, Align2::LEFT_TOP, text::elided(&name, letters), FontId::proportional(14.0), Color32::WHITE);
-        let parent = path.parent().map(|p| text::elided(&p.to_string_lossy(), letters + 4)).unwrap_or_default();
+        let parent = || path.parent().map(|p| p.to_string_lossy().into_owned()).unwrap_or_default();
+        let about = match known.map_or(&[][..], |known| &known.runs) {
+            [] => parent(),
+            [run] => run.facts(),
+            several => format!("{} trainings", several.len()),
+        };
         let small = FontId::proportional(10.5);
-        painter.text(at + vec2(0.0, 17.0), Align2::LEFT_TOP, parent, small, Color32::from_gray(200));
+        let about = text::elided(&about, letters + 8);
+        painter.text(at + vec2(0.0, 17.0), Align2::LEFT_TOP, about, small, Color32::from_gray(200));
         if response.hovered() || response.has_focus() {
-            ui.painter().rect_stroke(rect, 8.0, Stroke::new(1.5, theme::accent()), egui::StrokeKind::Inside);
+            let line = Stroke::new(1.5, theme::accent());
+            ui.painter().rect_stroke(rect, CARD_RADIUS, line, egui::StrokeKind::Inside);
         }
         response.clicked()
     }
-}
-
-/// Stores a small image of the scene at `of` for the next start.
-fn keep_picture(of: PathBuf, pixels: PhotoPixels, tasks: &Tasks, workspace: &Arc<Workspace>) {
-    let workspace = Arc::clone(workspace);
-    let title = format!("Saving the thumbnail of {}", text::path(of.file_name().map_or(of.as_path(), Path::new)));
-    // Nobody waits for it.
-    let _ = tasks.spawn(JobInfo::short(title).aside(), move |observer| {
-        // A full disk is no error here: the user did not ask for this record.
-        if let Err(e) = recent::keep(workspace.folders(), &of, &pixels) {
-            observer.note(Severity::Warning, e.to_string());
-        }
-        Ok::<_, Stop>(())
-    });
-}
-
-/// UV rectangle of the centered part of an image that fills a place.
-fn filling(picture: Vec2, place: Vec2) -> Rect {
-    let scale = (place.x / picture.x.max(1.0)).max(place.y / picture.y.max(1.0));
-    Rect::from_center_size(egui::pos2(0.5, 0.5), place / (picture.max(Vec2::splat(1.0)) * scale))
 }
 
 fn drop_area(ui: &mut Ui, width: f32) {
@@ -282,18 +298,4 @@ fn busy(ui: &mut Ui, job: &RunningJob, cx: &mut Ctx<'_>) {
             cx.ask(Action::Cancel);
         }
     });
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_picture_fills_its_place_undistorted() {
-        let uv = filling(vec2(400.0, 300.0), vec2(200.0, 100.0));
-        assert!((uv.width() - 1.0).abs() < 1e-6 && (uv.height() - 2.0 / 3.0).abs() < 1e-6, "{uv:?}");
-        let uv = filling(vec2(100.0, 300.0), vec2(200.0, 100.0));
-        assert!((uv.width() - 1.0).abs() < 1e-6 && (uv.height() - 1.0 / 6.0).abs() < 1e-6, "{uv:?}");
-        assert_eq!(uv.center(), egui::pos2(0.5, 0.5));
-    }
 }

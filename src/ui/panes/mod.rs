@@ -21,6 +21,7 @@ pub(crate) mod plots;
 pub(crate) mod problems;
 pub(crate) mod query;
 pub(crate) mod report;
+pub(crate) mod runs;
 pub(crate) mod training;
 pub(crate) mod unposed;
 

@@ -7,6 +7,7 @@ use egui::{
 
 use super::super::ctx::Ctx;
 use super::super::labels::{self, ScreenNames};
+use super::super::next_step::next_step;
 use super::super::object_menu;
 use super::super::text_field::take_keyboard;
 use super::super::theme;
@@ -288,9 +289,10 @@ fn show_how_to_begin(ui: &mut Ui, cx: &mut Ctx<'_>) {
         ui.label(RichText::new(text).color(theme::weak()));
     }
     let action = Action::FindObjects;
-    let found = ui
-        .add_enabled(idle, button(if has_masks { "Find objects" } else { "Find objects\u{2026}" }))
-        .on_disabled_hover_text(why);
+    let text = if has_masks { "Find objects" } else { "Find objects\u{2026}" };
+    let is_next = next_step(state).as_ref() == Some(&action);
+    let main = if is_next { theme::primary_button(text).min_size(vec2(170.0, 28.0)) } else { button(text) };
+    let found = ui.add_enabled(idle, main).on_disabled_hover_text(why);
     if found.on_hover_text(action.tooltip()).clicked() {
         cx.ask(action);
     }

@@ -11,6 +11,7 @@ use super::super::state::AppState;
 use super::super::theme;
 use super::super::viewport::Viewport;
 use super::PaneContents;
+use super::runs::RunsList;
 use crate::math::format;
 use crate::scene::{Dataset, PhotoPixels, text};
 use crate::ui::actions::Action;
@@ -32,13 +33,15 @@ pub(crate) struct PhotosPane {
     loaded: BTreeMap<usize, TextureHandle>,
     loading: HashMap<usize, Task<PhotoPixels>>,
     failed: BTreeSet<usize>,
+    /// Training runs of the photos.
+    pub(crate) runs: RunsList,
 }
 
 impl PhotosPane {
     /// Takes over newly loaded thumbnails.
     pub(crate) fn update(&mut self, ctx: &egui::Context, state: &AppState) {
         if self.scene != state.scene_number {
-            *self = Self { scene: state.scene_number, ..Self::default() };
+            *self = Self { scene: state.scene_number, runs: std::mem::take(&mut self.runs), ..Self::default() };
         }
         let (loaded, failed) = (&mut self.loaded, &mut self.failed);
         self.loading.retain(|&index, task| {
@@ -134,6 +137,7 @@ impl PaneContents for PhotosPane {
         if scene.remote.as_ref().is_some_and(|origin| !origin.photos) {
             ui.weak("The photos are missing there; only their cameras are known.");
         }
+        self.runs.show(ui, cx);
         let scores: HashMap<&str, f64> = state
             .history
             .evaluations

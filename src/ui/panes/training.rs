@@ -4,11 +4,13 @@ use egui::{ComboBox, DragValue, Grid, RichText, Slider, Ui};
 
 use super::super::ctx::Ctx;
 use super::super::layout::Layout;
+use super::super::next_step::next_step;
 use super::super::state::{AppState, RunningJob};
 use super::super::viewport::Viewport;
 use super::super::{keys, theme};
 use super::PaneContents;
 use super::plots::{self, PsnrCurve};
+use crate::io::scene_files::is_scene;
 use crate::jobs::presets;
 use crate::math::format;
 use crate::pipeline::train::TrainConfig;
@@ -45,7 +47,7 @@ impl PaneContents for TrainingPane {
                     dataset.photos.iter().map(|p| p.camera.width_px.max(p.camera.height_px)).max().unwrap_or(1);
                 settings(ui, &mut cx.layout.config, largest);
                 start(ui, cx);
-                other_runs(ui, cx);
+                place(ui, cx);
             }
         }
         if !state.history.steps.is_empty() || !state.history.evaluations.is_empty() {
@@ -65,23 +67,43 @@ impl PaneContents for TrainingPane {
 fn start(ui: &mut Ui, cx: &mut Ctx<'_>) {
     let state = cx.state;
     ui.add_space(2.0);
-    let busy = state.job.is_some();
+    let (busy, next) = (state.job.is_some(), next_step(state));
     ui.horizontal_wrapped(|ui| {
+        let after = match &next {
+            Some(Action::FindObjects) if state.scene.as_ref().is_some_and(|s| s.masks.is_none()) => {
+                "Find objects\u{2026}"
+            }
+            Some(Action::FindObjects) => "Find objects",
+            Some(Action::TypeQuery) => "Query an object",
+            _ => "",
+        };
+        if let Some(action) = next.as_ref().filter(|_| !after.is_empty()) {
+            let tip = format!("{}  {}", action.tooltip(), keys::label(ui.ctx(), action));
+            if ui.add(theme::primary_button(after).min_size(egui::vec2(120.0, 30.0))).on_hover_text(tip).clicked() {
+                cx.ask(action.clone());
+            }
+        }
         let tip = format!("{}  {}", Action::StartTraining.tooltip(), keys::label(ui.ctx(), &Action::StartTraining));
-        let next = state.next_training(&cx.layout.config);
-        let steps = format::count(next.steps);
-        let before = state.resumable.as_ref().map(|(before, _)| before);
-        let text = match state.continues_at(&next) {
-            Some(step) if before.is_some_and(|before| before.steps == next.steps) => {
+        let config = state.next_training(&cx.layout.config);
+        let steps = format::count(config.steps);
+        let before = state.resumable.as_ref().filter(|(before, _)| before.is_same_but_for_steps(&config));
+        let is_done = before.is_some_and(|(_, step)| *step >= config.steps);
+        let text = match state.continues_at(&config) {
+            Some(step) if before.is_some_and(|(before, _)| before.steps == config.steps) => {
                 format!("Continue ({} of {steps})", format::count(step))
             }
             Some(step) => format!("Go on from {} steps", format::count(step)),
+            None if is_done => "Continue training".to_owned(),
             None => "Start training".to_owned(),
         };
-        let button = theme::primary_button(&text).min_size(egui::vec2(150.0, 30.0));
-        let response =
-            ui.add_enabled(!busy, button).on_hover_text(tip).on_disabled_hover_text("Another job is running.");
-        if response.clicked() {
+        let is_next = next == Some(Action::StartTraining);
+        let button = if is_next { theme::primary_button(&text) } else { egui::Button::new(text) };
+        let why = match busy {
+            true => "Another job is running.".to_owned(),
+            false => format!("All {steps} steps are done: raise Steps to go on, or begin anew."),
+        };
+        let button = ui.add_enabled(!busy && !is_done, button.min_size(egui::vec2(110.0, 30.0)));
+        if button.on_hover_text(tip).on_disabled_hover_text(why).clicked() {
             cx.ask(Action::StartTraining);
         }
         if state.can_begin_anew() {
@@ -103,20 +125,22 @@ fn start(ui: &mut Ui, cx: &mut Ctx<'_>) {
     });
 }
 
-/// Other trainings of these photos, each with a button to open it.
-fn other_runs(ui: &mut Ui, cx: &mut Ctx<'_>) {
+/// Place of the scene, with what can be done there.
+fn place(ui: &mut Ui, cx: &mut Ctx<'_>) {
     let state = cx.state;
-    let Some(scene) = &state.scene else { return };
-    for run in scene.runs.iter().filter(|run| run.folder != scene.out) {
-        ui.horizontal(|ui| {
-            let open = ui.add_enabled(state.job.is_none(), egui::Button::new("Open").small());
-            let open = open.on_hover_text(text::path(&run.folder)).on_disabled_hover_text("Another job is running.");
-            if open.accessible_name(format!("Open {}", run.text())).clicked() {
-                cx.ask(Action::Open(run.folder.clone()));
+    let Some(scene) = state.scene.as_ref().filter(|s| state.is_trained() && is_scene(&s.out)) else { return };
+    ui.add_space(2.0);
+    let place = format!("Saved in {}", text::elided(&scene.out.to_string_lossy(), 44));
+    ui.label(RichText::new(place).small().color(theme::weak())).on_hover_text(text::path(&scene.out));
+    ui.horizontal(|ui| {
+        for (name, action) in [("Show in folder", Action::ShowFolder(None)), ("Save a copy\u{2026}", Action::SaveCopy)]
+        {
+            let button = ui.add_enabled(state.job.is_none(), egui::Button::new(name).small());
+            if button.on_hover_text(action.tooltip()).on_disabled_hover_text("Another job is running.").clicked() {
+                cx.ask(action);
             }
-            ui.label(RichText::new(run.text()).small().color(theme::weak()));
-        });
-    }
+        }
+    });
 }
 
 fn settings(ui: &mut Ui, config: &mut TrainConfig, largest_px: u32) {

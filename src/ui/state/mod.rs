@@ -15,7 +15,7 @@ use crate::io::unposed::Unposed;
 use crate::jobs::go_to::Explored;
 use crate::jobs::models::ModelList;
 use crate::jobs::rearrange::RearrangedScene;
-use crate::jobs::recent::RunSummary;
+use crate::jobs::recent::RecentScene;
 use crate::jobs::remove::StoredRemoval;
 use crate::jobs::workspace::TrainedRun;
 use crate::jobs::{OpenedScene, Scene};
@@ -95,8 +95,8 @@ pub struct AppState {
     pub(crate) unposed: Option<Box<Unposed>>,
     /// Recently opened files and folders, newest first.
     pub recent: Vec<PathBuf>,
-    /// All trainings of recent folders with several.
-    pub recent_runs: Vec<(PathBuf, Vec<RunSummary>)>,
+    /// What is known of them, once it is read.
+    pub recent_scenes: Vec<RecentScene>,
     /// Error against run time, if a report is open.
     pub report: Option<ShownReport>,
     /// The report to compare with.

@@ -22,8 +22,8 @@ fn the_shipped_demo_opens_answered_and_recent_scenes_have_pictures() {
     let kept = || std::fs::read_dir(place().join("pictures")).map_or(0, |all| all.count());
     w.until("its picture", |_| kept() == 1);
     let mut later = Window::keeping(place(), None);
-    assert!(!later.shows("dots.ply"));
+    assert!(!later.shows("dots"));
     later.harness.state_mut().state.recent = vec![splat];
     later.harness.run_steps(2);
-    assert!(later.shows("dots.ply") && later.is_drawn());
+    assert!(later.shows("dots") && later.is_drawn());
 }

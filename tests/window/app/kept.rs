@@ -202,7 +202,7 @@ fn the_first_page_lists_every_training_of_recent_photos() {
     drop(w);
     let mut w = Window::keeping(data, None);
     w.harness.state_mut().state.recent = vec![photos()];
-    w.until("the list", |a| !a.state.recent_runs.is_empty());
+    w.until("the list", |a| !a.state.recent_scenes.is_empty());
     assert!(w.shows("was trained 2 times"));
     let link = w.harness.query_all_by_label_contains("run-1: 100 steps").next().expect("a link");
     link.click();

@@ -17,6 +17,7 @@ mod queries;
 mod rearranging;
 mod removing;
 mod report;
+mod runs;
 mod selecting;
 mod shapes;
 mod split;

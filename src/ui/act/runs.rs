@@ -1,0 +1,115 @@
+//! Training runs and the folders of scenes: opening the last, renaming, deleting, showing and copying.
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use super::export::is_saved;
+use super::open::file_name;
+use super::remote;
+use crate::io::scene_files::is_scene;
+use crate::jobs::{JobError, runs, save_copy, show_folder};
+use crate::pipeline::observer::Observer;
+use crate::ui::actions::Action;
+use crate::ui::app::App;
+use crate::ui::dialogs::{DialogAnswer, Question};
+use crate::ui::file_dialogs::FileRequest;
+use crate::ui::state::Tone;
+use crate::worker::{Failure, JobInfo, Stop};
+
+pub(in crate::ui) fn open_last(app: &mut App) {
+    match app.state.recent.first().cloned() {
+        Some(path) => app.ask(Action::Open(path)),
+        None => app.state.toast(Tone::Info, "No scene was open before."),
+    }
+}
+
+/// Gives a training run another name.
+pub(in crate::ui) fn rename(app: &mut App, run: PathBuf, name: String) {
+    let workspace = Arc::clone(&app.workspace);
+    let rename = move |_: &mut dyn Observer| runs::rename(workspace.folders(), &run, &name);
+    app.start(JobInfo::short("Renaming the training"), rename, |app, ()| app.photos.runs.refresh());
+}
+
+/// Asks for confirmation, and deletes a training run.
+pub(in crate::ui) fn ask_to_delete(app: &mut App, run: PathBuf) {
+    let is_open = app.state.scene.as_ref().is_some_and(|s| s.out == run);
+    if is_open && (app.state.job.is_some() || app.is_editing()) {
+        let text = "This training is being worked on; cancel that first (Esc).";
+        return app.state.toast(Tone::Warning, text);
+    }
+    let known = app.state.scene.as_ref().and_then(|s| s.runs.iter().find(|known| known.folder == run));
+    let (what, stays) = match known {
+        Some(known) if !known.is_training => ("edited scene", "The training that it was made of stays."),
+        _ => ("training", "The photos and the other trainings stay."),
+    };
+    let name = known.map_or_else(|| file_name(&run), |known| format!("{} ({})", known.name, known.facts()));
+    let text = format!(
+        "Delete the {what} {name}? Its Gaussians and objects are deleted with its folder. {stays} This cannot be \
+         undone.\n\n{}",
+        run.display()
+    );
+    let question = Question { text, yes: "Delete", other: None, no: "Cancel", deletes: true };
+    app.put_question(question, |app, answer| {
+        if answer == DialogAnswer::Yes {
+            delete(app, run);
+        }
+    });
+}
+
+fn delete(app: &mut App, run: PathBuf) {
+    let workspace = Arc::clone(&app.workspace);
+    let delete = move |_: &mut dyn Observer| runs::delete(workspace.folders(), &run).map(|()| run);
+    app.start(JobInfo::short("Deleting the training"), delete, |app, run| {
+        app.state.toast(Tone::Good, format!("Deleted {}", run.display()));
+        app.state.recent.retain(|path| *path != run);
+        app.photos.runs.refresh();
+        let scene = app.state.scene.as_ref().filter(|s| s.out == run);
+        // What was deleted is not worked on any more.
+        if let Some(photos) = scene.and_then(|s| s.dataset.as_ref()).map(|d| d.source().to_path_buf()) {
+            app.ask(Action::Open(photos));
+        }
+    });
+}
+
+/// Shows a folder, or that of the open scene, in the system's file manager. Where there is none, its path is on the
+/// clipboard.
+pub(in crate::ui) fn show_folder(app: &mut App, ctx: &egui::Context, of: Option<PathBuf>) {
+    let place = |path: &Path| if path.is_file() { path.parent().map(Path::to_path_buf) } else { Some(path.into()) };
+    let Some(folder) = of.or_else(|| place(app.state.scene.as_ref()?.stored())) else {
+        return app.state.toast(Tone::Warning, "Open a scene first: there is no folder to show.");
+    };
+    if remote::refuses(app, "Showing the folder", "look there") {
+        return;
+    }
+    let (ctx, path) = (ctx.clone(), folder.display().to_string());
+    let show = move |_: &mut dyn Observer| {
+        let remedy = "Its path is on the clipboard now.";
+        let failed = |e| Failure::new(format!("{} cannot be shown here: {e}.", folder.display()), remedy);
+        show_folder::run(&folder).map_err(|e| Stop::Failed(failed(e)))
+    };
+    app.start_to_end(JobInfo::short("Showing the folder"), show, move |_, _, end| {
+        if end.is_err() {
+            ctx.copy_text(path);
+        }
+    });
+}
+
+/// Copies the scene's folder to another place.
+pub(in crate::ui) fn save_copy(app: &mut App) {
+    let Some(from) = app.state.scene.as_ref().map(|s| s.out.clone()) else {
+        return app.state.toast(Tone::Warning, "Nothing to copy yet: open a scene first.");
+    };
+    if remote::refuses(app, "Copying the scene", "copy its folder there") {
+        return;
+    }
+    if app.state.is_training() || !is_scene(&from) {
+        let text = "Nothing to copy yet: a scene is copied once it is trained. Export Gaussians writes a splat file.";
+        return app.state.toast(Tone::Warning, text);
+    }
+    app.choose(FileRequest::folder("Choose an empty folder for the copy"), move |app, to| {
+        let info = JobInfo::long(format!("Copying the scene to {}", file_name(&to))).pausable();
+        let copy =
+            move |observer: &mut dyn Observer| -> Result<PathBuf, JobError> { save_copy::run(&from, &to, observer) };
+        app.start(info, copy, is_saved);
+    });
+}
