@@ -11,6 +11,7 @@ pub(crate) mod camera;
 pub(crate) mod chat;
 mod chat_lines;
 mod chat_model;
+mod chat_offers;
 pub mod color_by;
 pub(crate) mod comparison;
 mod context;

@@ -14,16 +14,20 @@ use crate::ui::panes::plan::PlanPane;
 use crate::ui::panes::query::QueryPane;
 use crate::ui::panes::{PaneContents, bars, problems, unposed};
 use crate::ui::theme;
+use crate::ui::toasts::{self, ToastClick};
 use crate::ui::viewport::query::closed;
 
 /// The window's bars and panes.
 pub(super) fn panes(app: &mut App, ui: &mut Ui) {
+    app.toasts.update(ui.ctx(), &mut app.state, app.layout.shows(Pane::Log));
     let bar = Frame::new().fill(theme::panel()).inner_margin(Margin::symmetric(10, 6));
     if !fills_window(app) {
         let (mut cx, viewport) = app.context();
         let second = viewport.queries.is_second();
         Panel::top("menus").frame(bar).show(ui, |ui| bars::top(ui, &mut cx, second));
-        Panel::bottom("status").frame(bar).show(ui, |ui| bars::status(ui, &mut cx, viewport.picture()));
+        let status = Panel::bottom("status").frame(bar);
+        let clicked = status.show(ui, |ui| bars::status(ui, &mut cx, viewport.picture())).inner;
+        message_clicked(app, clicked);
     }
     problems::show(ui, &mut app.state);
     CentralPanel::no_frame().frame(Frame::new().fill(theme::canvas())).show(ui, |ui| {
@@ -67,7 +71,18 @@ pub(super) fn over_everything(app: &mut App, ctx: &egui::Context) {
         // The view and the dialogs of this frame are drawn already.
         ctx.request_repaint();
     }
-    app.toasts.show(ctx, &mut app.state, ctx.content_rect().shrink2(egui::vec2(0.0, 44.0)));
+    if fills_window(app) {
+        let clicked = toasts::float(ctx, &app.state.toasts);
+        message_clicked(app, clicked);
+    }
+}
+
+fn message_clicked(app: &mut App, clicked: Option<ToastClick>) {
+    match clicked {
+        Some(ToastClick::Dismiss) => drop(app.state.toasts.pop()),
+        Some(ToastClick::OpenLog) => app.ask(Action::ShowPane(Pane::Log)),
+        None => {}
+    }
 }
 
 /// True if the view fills the window.

@@ -2,11 +2,12 @@
 
 use std::time::{Duration, Instant};
 
-use egui::{Align, Button, RichText, Stroke, Ui, vec2};
+use egui::{Align, Button, Layout, RichText, Stroke, Ui, vec2};
 use strum::VariantArray;
 
 use super::super::ctx::Ctx;
 use super::super::state::RunningJob;
+use super::super::toasts::{self, ToastClick};
 use super::super::{keys, theme};
 use crate::math::format;
 use crate::pipeline::observer::Progress;
@@ -150,7 +151,7 @@ pub(crate) fn top(ui: &mut Ui, cx: &mut Ctx<'_>, second: bool) {
                 ui.label(RichText::new(format!("on {}", origin.host)).color(theme::weak()));
             }
         }
-        ui.with_layout(egui::Layout::right_to_left(Align::Center), |ui| {
+        ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
             let search = Button::new(RichText::new("Search actions").color(theme::weak()))
                 .shortcut_text(keys::label(ui.ctx(), &Action::Palette));
             if ui.add(search).on_hover_text(Action::Palette.tooltip()).clicked() {
@@ -186,9 +187,9 @@ fn entry(ui: &mut Ui, enabled: bool, on: Option<bool>, text: &str, action: Actio
     }
 }
 
-/// Draws the bar at the bottom.
-pub(crate) fn status(ui: &mut Ui, cx: &mut Ctx<'_>, picture: Option<&ViewPicture>) {
-    let state = cx.state;
+/// Draws the bar at the bottom; returns the click on its message.
+pub(crate) fn status(ui: &mut Ui, cx: &mut Ctx<'_>, picture: Option<&ViewPicture>) -> Option<ToastClick> {
+    let (state, mut clicked) = (cx.state, None);
     ui.horizontal(|ui| {
         match &state.job {
             Some(job) => {
@@ -203,6 +204,7 @@ pub(crate) fn status(ui: &mut Ui, cx: &mut Ctx<'_>, picture: Option<&ViewPicture
                     progress(ui, p, job);
                 }
             }
+            None if !state.toasts.is_empty() => {}
             None => {
                 ui.label(
                     RichText::new(if state.scene.is_some() { "Ready" } else { "Nothing open" }).color(theme::weak()),
@@ -212,7 +214,7 @@ pub(crate) fn status(ui: &mut Ui, cx: &mut Ctx<'_>, picture: Option<&ViewPicture
         if let Some(link) = &state.link {
             connection(ui, link);
         }
-        ui.with_layout(egui::Layout::right_to_left(Align::Center), |ui| {
+        ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
             let log = ui.selectable_label(cx.layout.shows(Pane::Log), "Log");
             if log.on_hover_text("Show or hide the log").clicked() {
                 cx.ask(Action::TogglePane(Pane::Log));
@@ -224,8 +226,11 @@ pub(crate) fn status(ui: &mut Ui, cx: &mut Ctx<'_>, picture: Option<&ViewPicture
                     None => ui.label(text.color(theme::weak())),
                 };
             }
+            let row = Layout::left_to_right(Align::Center);
+            clicked = ui.with_layout(row, |ui| toasts::show(ui, &state.toasts)).inner;
         });
     });
+    clicked
 }
 
 /// State of the connection to another computer.
