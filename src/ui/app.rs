@@ -11,6 +11,7 @@ use super::ctx::Ctx;
 use super::dialogs::{DialogAnswer, Question};
 use super::file_dialogs::{FileDialogs, FileRequest};
 use super::find_dialog::FindDialog;
+use super::help::HelpPage;
 use super::history::{EditStep, Editing};
 use super::keep_dialog::KeepDialog;
 use super::layout::Layout;
@@ -60,6 +61,7 @@ pub struct App {
     pub(super) asks_in_vain: bool,
     pub(super) palette: Palette,
     pub(super) sheet: bool,
+    pub(super) help: Option<HelpPage>,
     /// True once the user wants to quit while a job runs.
     pub(super) quits: bool,
     pub(super) first_page: FirstPage,
@@ -128,6 +130,7 @@ impl App {
             asks_in_vain: false,
             palette: Palette::default(),
             sheet: false,
+            help: None,
             quits: false,
             first_page: FirstPage::default(),
             photos: PhotosPane::default(),

@@ -34,8 +34,8 @@ const NEWS: usize = 1024;
 const MAX_LINES: usize = 400;
 /// Completions shown at once.
 const CONTINUATIONS: usize = 4;
-/// Height of the box, its completions and the buttons below the conversation, points.
-const BELOW_PT: f32 = 130.0;
+/// Least height of the box, its completions and the buttons below the conversation, points.
+const BELOW_PT: f32 = 90.0;
 
 /// Answer to what the program does, but not the chat.
 const NOT_BY_CHAT: &str = "The chat does not do this, but the program does (Ctrl+P finds it, too):";
@@ -90,6 +90,8 @@ pub(crate) struct Chat {
     chooser: ModelChooser,
     /// Number of the scene that the last lines are about.
     scene: u64,
+    /// Height below the conversation at the last redraw, points.
+    below_pt: f32,
 }
 
 impl Chat {
@@ -209,7 +211,7 @@ impl PaneContents for Chat {
                 }
             });
         } else {
-            let height = (ui.available_height() - BELOW_PT).max(60.0);
+            let height = (ui.available_height() - self.below_pt.max(BELOW_PT)).max(60.0);
             ScrollArea::vertical().id_salt("talk").max_height(height).stick_to_bottom(true).show(ui, |ui| {
                 match chat_lines::show(ui, &self.lines, object_thumbnails) {
                     Some(ChatClick::Say(text)) => say = Some(text),
@@ -227,6 +229,7 @@ impl PaneContents for Chat {
                 }
             });
         }
+        let below = ui.cursor().top();
         ui.horizontal(|ui| {
             let width = (ui.available_width() - 62.0).max(80.0);
             let hint = if ready { "show me \u{2026}" } else { "Find objects first" };
@@ -272,6 +275,7 @@ impl PaneContents for Chat {
                 *self = Self::default();
             }
         });
+        self.below_pt = ui.cursor().top() - below;
         self.waiting.extend(say);
     }
 }

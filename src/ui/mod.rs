@@ -22,6 +22,7 @@ mod file_dialogs;
 mod find_dialog;
 mod fonts;
 mod frame;
+pub(crate) mod help;
 mod history;
 pub(crate) mod keep_dialog;
 mod keys;

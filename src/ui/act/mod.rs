@@ -15,6 +15,7 @@ pub(super) mod window;
 
 use super::actions::{Action, action_table};
 use super::app::App;
+use super::help::HelpPage;
 use super::history::EditStep;
 use super::viewport::overrides::RenderOverrides;
 use super::viewport::tools::Tool;

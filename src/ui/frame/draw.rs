@@ -7,6 +7,7 @@ use crate::ui::actions::{Action, Pane};
 use crate::ui::app::App;
 use crate::ui::ctx::Ctx;
 use crate::ui::dialogs;
+use crate::ui::help;
 use crate::ui::dock::{DockContents, Place};
 use crate::ui::palette::shortcut_sheet;
 use crate::ui::panes::log::LogPane;
@@ -51,6 +52,7 @@ pub(super) fn over_everything(app: &mut App, ctx: &egui::Context) {
         app.ask(action);
     }
     shortcut_sheet(ctx, &mut app.sheet);
+    help::show(ctx, &mut app.help);
     let answer = app.question.as_ref().and_then(|(question, _)| question.show(ctx));
     if let Some((answer, (_, then))) = answer.zip(app.question.take_if(|_| answer.is_some())) {
         then(app, answer);

@@ -25,7 +25,7 @@ pub(super) fn take(app: &mut App, ctx: &Context) {
         egui::Popup::close_all(ctx);
     }
     query::follow_vain_query(app, ctx);
-    if !app.palette.is_open() && !has_dialog && !app.sheet && !has_menu {
+    if !app.palette.is_open() && !has_dialog && !app.sheet && app.help.is_none() && !has_menu {
         for action in keys::pressed(ctx) {
             if keys::opens_field(&action) {
                 // Before drawing: text typed in this frame belongs to the field.

@@ -141,8 +141,13 @@ pub(crate) fn top(ui: &mut Ui, cx: &mut Ctx<'_>, second: bool) {
         });
         ui.menu_button("Help", |ui| {
             ui.set_min_width(240.0);
-            item(ui, true, None, Action::Palette, cx);
-            item(ui, true, None, Action::Shortcuts, cx);
+            for action in [Action::Guide, Action::Shortcuts, Action::Palette] {
+                item(ui, true, None, action, cx);
+            }
+            ui.separator();
+            for action in [Action::News, Action::About] {
+                item(ui, true, None, action, cx);
+            }
         });
         if let Some(scene) = &state.scene {
             ui.separator();
