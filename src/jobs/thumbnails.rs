@@ -53,7 +53,9 @@ mod tests {
         let home = HomeView { camera: None, bounds, up: glam::DVec3::Z };
         let shades = |pictures: Thumbnails| {
             let picture = pictures.into_iter().next().flatten().expect("a picture");
-            [0, 1].map(|k| picture.iter().map(|p| p[1]).fold(if k == 0 { 255 } else { 0 }, if k == 0 { u8::min } else { u8::max }))
+            [0, 1].map(|k| {
+                picture.iter().map(|p| p[1]).fold(if k == 0 { 255 } else { 0 }, if k == 0 { u8::min } else { u8::max })
+            })
         };
         let [dark, light] = shades(draw(&cloud, &map, &settings, &home).expect("drawn").pictures);
         assert!(dark < 40 && light > 200, "{dark} to {light}");

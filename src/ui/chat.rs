@@ -337,10 +337,13 @@ impl Agent {
         };
         let identities = World::identities(world);
         let offers = missing.map(|missing| offers(&said, identities, missing)).unwrap_or_default();
-        self.reply(match offers.is_empty() {
-            true => ChatAnswer { candidates, refused: reply.refused, asks, ..ChatAnswer::new(&text) },
-            false => ChatAnswer { offers, ..ChatAnswer::new(NOT_BY_CHAT) },
-        }, transcript);
+        self.reply(
+            match offers.is_empty() {
+                true => ChatAnswer { candidates, refused: reply.refused, asks, ..ChatAnswer::new(&text) },
+                false => ChatAnswer { offers, ..ChatAnswer::new(NOT_BY_CHAT) },
+            },
+            transcript,
+        );
     }
 
     fn reply(&self, answer: ChatAnswer, transcript: [String; 2]) {

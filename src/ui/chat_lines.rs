@@ -79,7 +79,9 @@ pub(super) fn show(ui: &mut Ui, lines: &[Line], object_thumbnails: &ObjectThumbn
                 // What the answer says already is no step, and neither is what it refuses.
                 let refused = answer.refused.as_ref().map_or("", |r| r.text.as_str());
                 let is_new = |line: &&Line| match line {
-                    Line::Did(text, done) => *done != Some(false) && ![&answer.text, refused].iter().any(|t| t.contains(text.trim())),
+                    Line::Did(text, done) => {
+                        *done != Some(false) && ![&answer.text, refused].iter().any(|t| t.contains(text.trim()))
+                    }
                     _ => true,
                 };
                 let told: Vec<&Line> = rest[..steps].iter().filter(is_new).collect();

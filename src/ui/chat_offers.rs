@@ -9,7 +9,9 @@ use crate::ui::object_menu;
 use crate::worker::ViewMode;
 
 /// Most words between two words of a phrase.
-const GAP: usize = 4;
+const GAP: usize = 3;
+/// Most words before the name of a thing, such as "of the".
+const ARTICLES: usize = 2;
 
 /// Actions that are offered.
 enum Offered {
@@ -24,20 +26,37 @@ use Offered::{OnThing, These};
 /// `a|b` is one of several words, `{}` the name of a thing, `{color}` a color.
 const OFFERS: &[(&[&str], Offered)] = &[
     (
-        &["screenshot", "screen shot", "snapshot", "take|save|capture|grab picture|image|photo|view|screen", "as png"],
+        &[
+            "screenshot",
+            "screen shot",
+            "snapshot",
+            "save|capture|grab picture|image|view|screen",
+            "take a|another picture|photo|image|shot",
+            "as png",
+        ],
         These(|| vec![Action::Screenshot]),
     ),
     (
+        &["play path|flight|keyframe", "fly along path|keyframe"],
+        These(|| vec![Action::PlayPath, Action::ShowPane(Pane::Camera)]),
+    ),
+    (
         &[
-            "video", "movie", "animation", "turntable", "mp4", "make|save|export|record gif", "film {}", "fly|orbit|circle around",
-            "go|goes around", "camera path|tour", "keyframe",
+            "video",
+            "movie",
+            "animation",
+            "turntable",
+            "mp4",
+            "make|save|export|record gif",
+            "film {}",
+            "fly|orbit|circle around",
+            "go|goes around",
+            "camera path|tour|move|movement",
+            "keyframe",
         ],
         These(|| vec![Action::ShowPane(Pane::Camera), Action::AddKey, Action::ExportVideo]),
     ),
-    (
-        &["conversation|chat save|export", "save|export conversation|chat"],
-        These(|| vec![Action::SaveChat]),
-    ),
+    (&["conversation|chat save|export", "save|export conversation|chat"], These(|| vec![Action::SaveChat])),
     (
         &["export|save|write|download mask", "mask as|to|into png|coco|file|folder"],
         These(|| vec![Action::ExportAll, Action::ExportPhrases]),
@@ -49,7 +68,7 @@ const OFFERS: &[(&[&str], Offered)] = &[
         These(|| vec![Action::ExportAll, Action::ExportPly]),
     ),
     (
-        &["export|download|write {}", "save {} as|to|in|into", "{} as ply|spz|sog|glb|splat|file"],
+        &["export|download|write {}", "save {} as|to|in|into", "give|get|need|want {} as ply|spz|sog|glb|splat|file"],
         OnThing(Action::ExportTarget),
     ),
     (
@@ -65,7 +84,12 @@ const OFFERS: &[(&[&str], Offered)] = &[
         These(|| vec![Action::TrainAnew, Action::StartTraining]),
     ),
     (
-        &["start|begin|run|continue|launch|do train|training", "train", "how train|training", "optimize|fit gaussian|scene"],
+        &[
+            "start|begin|run|continue|launch|do train|training",
+            "train",
+            "how train|training",
+            "optimize|fit gaussian|scene",
+        ],
         These(|| vec![Action::StartTraining]),
     ),
     (&["psnr", "ssim", "evaluate", "held out"], These(|| vec![Action::Evaluate])),
@@ -74,26 +98,35 @@ const OFFERS: &[(&[&str], Offered)] = &[
         These(|| vec![Action::MeasureSplats]),
     ),
     (&["crop", "clip|cut box", "cut|trim away|off|out scene|gaussian|background|rest"], These(|| vec![Action::Crop])),
+    (&["compare|comparison scene|training|run|model", "compare two"], These(|| vec![Action::ChooseComparison])),
     (
-        &["compare|comparison scene|training|run|model", "compare two"],
-        These(|| vec![Action::ChooseComparison]),
-    ),
-    (
-        &["compare|comparison|next|versus|vs|against|difference photo|picture|image|truth|original", "ground truth", "compare"],
+        &[
+            "compare|comparison|next|versus|vs|against|difference photo|picture|image|truth|original",
+            "ground truth",
+            "compare",
+        ],
         These(|| vec![Action::ToggleCompare, Action::Show(ViewMode::Difference)]),
     ),
     (&["side by side", "split view|screen", "two view"], These(|| vec![Action::ToggleSplit])),
     (&["measure", "ruler", "tape", "set|change scale|unit"], These(|| vec![Action::Measure])),
-    (&["depth map|view|image|picture", "show|see|display|color|draw depth"], These(|| vec![Action::Show(ViewMode::Depth)])),
+    (
+        &["depth map|view|image|picture", "show|see|display|color|draw depth"],
+        These(|| vec![Action::Show(ViewMode::Depth)]),
+    ),
     (&["alpha", "opacity"], These(|| vec![Action::Show(ViewMode::Alpha)])),
     (&["inspect", "property|parameter gaussian|splat|pixel"], These(|| vec![Action::Inspect])),
     (
         &[
-            "recolor|recolour|repaint|paint|tint|dye", "color|colour {} {color}", "make|turn|change|want {} {color}",
-            "change|another|new|different color|colour {}", "move|shift|push|pull|slide|drag|lift|raise|lower {}",
-            "rotate|turn|spin|tilt|flip {}", "scale|resize|enlarge|shrink|stretch|duplicate|clone|copy {}",
-            "put|place|set|stand {} on|onto|next|beside|under|left|right|behind|in|into|up|down|by",
-            "make {} bigger|larger|smaller|taller|shorter|wider", "copy of {}",
+            "recolor|recolour|repaint|paint|tint|dye",
+            "color|colour {} {color}",
+            "make|turn|change|want {} {color}",
+            "change|another|new|different color|colour {}",
+            "move|shift|push|pull|slide|drag|lift|raise|lower {}",
+            "rotate|turn|spin|tilt|flip {}",
+            "scale|resize|enlarge|shrink|stretch|duplicate|clone|copy {}",
+            "put|place|set {} on|onto|next|beside|under|left|right|behind|in|into|up|down|by",
+            "make {} bigger|larger|smaller|taller|shorter|wider",
+            "copy of {}",
         ],
         OnThing(Action::Transform),
     ),
@@ -119,61 +152,63 @@ const OFFERS: &[(&[&str], Offered)] = &[
 /// not there; a single word is then no reason to offer something else.
 pub(super) fn offers(sentence: &str, all: &Identities, is_missing: bool) -> Vec<(Action, String)> {
     let said = words(sentence);
-    let thing = named_in(&said, all);
-    let is_asked = |phrase: &str| {
-        let is_clear = !is_missing || phrase.contains(' ');
-        is_clear && (thing.is_some() || !phrase.contains("{}")) && fits(phrase, &said)
-    };
-    let Some((_, offered)) = OFFERS.iter().find(|(phrases, _)| phrases.iter().any(|p| is_asked(p))) else {
-        return Vec::new();
-    };
-    match (offered, thing) {
-        (These(actions), _) => actions().into_iter().map(|action| (action.clone(), action.text())).collect(),
-        (OnThing(action), Some(id)) => {
-            let action = action(id);
-            let named = object_menu::named_actions(all, id).into_iter().find(|(known, _)| *known == action);
-            vec![named.unwrap_or_else(|| (action.clone(), action.text()))]
-        }
-        (OnThing(_), None) => {
-            let list = Action::ShowPane(Pane::Objects);
-            vec![(list.clone(), list.text())]
-        }
+    let fit = OFFERS.iter().find_map(|(phrases, offered)| {
+        let mut clear = phrases.iter().filter(|phrase| !is_missing || phrase.contains(' '));
+        Some((offered, clear.find_map(|phrase| fits(phrase, &said, all))?))
+    });
+    let thing = || (0..said.len()).find_map(|at| named_at(&said, at, all)).map(|(id, _)| id);
+    match fit {
+        None => Vec::new(),
+        Some((These(actions), _)) => actions().into_iter().map(|action| (action.clone(), action.text())).collect(),
+        Some((OnThing(action), named)) => match named.or_else(thing) {
+            Some(id) => {
+                let action = action(id);
+                let known = object_menu::named_actions(all, id).into_iter().find(|(known, _)| *known == action);
+                vec![known.unwrap_or_else(|| (action.clone(), action.text()))]
+            }
+            None => {
+                let list = Action::ShowPane(Pane::Objects);
+                vec![(list.clone(), list.text())]
+            }
+        },
     }
 }
 
-/// Returns whether the words of a phrase occur in this order, not far from each other.
-fn fits(phrase: &str, said: &[String]) -> bool {
-    let (mut at, mut room) = (0, said.len());
+/// Compares a phrase with a sentence: its words must occur in this order, not far from each other. Returns the thing
+/// at the place of its `{}`, if it has one.
+fn fits(phrase: &str, said: &[String], all: &Identities) -> Option<Option<IdentityId>> {
+    let (mut at, mut gap, mut thing) = (0, said.len(), None);
     for item in phrase.split(' ') {
         if item == "{}" {
-            // The name is somewhere between.
-            room += GAP;
+            let places = (at..said.len()).take(if at == 0 { said.len() } else { ARTICLES + 1 });
+            let (place, (id, words)) = places.map(|p| (p, named_at(said, p, all))).find_map(|(p, n)| Some((p, n?)))?;
+            (at, gap, thing) = (place + words, GAP, Some(id));
             continue;
         }
         let is_word = |word: &String| match item {
             "{color}" => colors::row(word).is_some(),
             _ => item.split('|').any(|one| singular(one) == *word),
         };
-        let Some(next) = said[at..].iter().take(room + 1).position(is_word) else { return false };
-        (at, room) = (at + next + 1, GAP);
+        let next = said[at..].iter().take(gap + 1).position(is_word)?;
+        (at, gap) = (at + next + 1, GAP);
     }
-    true
+    Some(thing)
 }
 
-/// The thing that a sentence names first; `None` if there is none or it could be one of several.
-fn named_in(said: &[String], all: &Identities) -> Option<IdentityId> {
-    let named_at = |at: usize| -> Vec<(IdentityId, usize)> {
-        let longest = |id| all.words().names(id).iter().filter(|n| said[at..].starts_with(n)).map(Vec::len).max();
-        all.iter().filter_map(|(id, _)| Some((id, longest(id).filter(|n| *n > 0)?))).collect()
+/// The thing whose name begins at a word of a sentence, and the number of its words; `None` if it could be one of
+/// several.
+fn named_at(said: &[String], at: usize, all: &Identities) -> Option<(IdentityId, usize)> {
+    let named = |at: usize| {
+        let longest = move |id| all.words().names(id).iter().filter(|n| said[at..].starts_with(n)).map(Vec::len).max();
+        all.iter().filter_map(move |(id, _)| Some((id, longest(id).filter(|n| *n > 0)?)))
     };
-    let first = (0..said.len()).map(named_at).find(|named| !named.is_empty())?;
-    let most = first.iter().map(|(_, n)| *n).max()?;
-    let ids: Vec<IdentityId> = first.into_iter().filter(|(_, n)| *n == most).map(|(id, _)| id).collect();
+    let most = named(at).map(|(_, n)| n).max()?;
+    let ids: Vec<IdentityId> = named(at).filter(|(_, n)| *n == most).map(|(id, _)| id).collect();
     // "the lid of the kettle": the lid whose whole is named as well.
-    let wholes: Vec<IdentityId> = (0..said.len()).flat_map(named_at).map(|(id, _)| id).collect();
+    let wholes: Vec<IdentityId> = (0..said.len()).flat_map(named).map(|(id, _)| id).collect();
     let mut within = ids.iter().filter(|id| wholes.iter().any(|whole| all.is_piece(**id, *whole)));
     match (ids.as_slice(), within.next(), within.next()) {
-        ([one], _, _) | (_, Some(one), None) => Some(*one),
+        ([one], _, _) | (_, Some(one), None) => Some((*one, most)),
         _ => None,
     }
 }
@@ -207,6 +242,8 @@ mod tests {
             ("can you save this picture?", Action::Screenshot),
             ("make the red controller green", Action::Transform(5)),
             ("I want the bear to be purple: paint it", Action::Transform(7)),
+            ("change the color of the kettle", Action::Transform(1)),
+            ("now a camera move that circles the bear", Action::ShowPane(Pane::Camera)),
             ("move the kettle next to the camera please", Action::Transform(1)),
             ("recolor something", Action::ShowPane(Pane::Objects)),
             ("rotate the teddy bear by 90 degrees", Action::Transform(7)),
@@ -244,6 +281,9 @@ mod tests {
             "is the kettle hotter than the bear",
             "why is the jar so big",
             "where's my phone?",
+            "turn me maybe 90 degrees to the left so I get the kettle",
+            "this jar is in my way, take it off the picture for a second",
+            "undo the change to the red controller",
             "tell me a joke",
             "",
         ] {
@@ -267,9 +307,7 @@ mod tests {
                 These(actions) => actions(),
                 OnThing(action) => vec![action(1)],
             };
-            let is_known = |a: &Action| {
-                palette.contains(a) || menu.iter().any(|(m, _)| m == a)
-            };
+            let is_known = |a: &Action| palette.contains(a) || menu.iter().any(|(m, _)| m == a);
             assert!(actions.iter().all(is_known), "{phrases:?}");
         }
     }
