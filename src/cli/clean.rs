@@ -73,8 +73,9 @@ pub(crate) fn run(args: CleanArgs, quiet: bool) -> Result<(), CliError> {
         }));
     }
     for (rule, n) in counts {
-        let share = format::number(100.0 * n as f64 / scene.cloud.len().max(1) as f64);
-        output::print(&format!("{:<14}{n:>9}  {share:>6} %  {}", rule.to_string(), rule.meaning()))?;
+        let share = format::percent(n as f64 / scene.cloud.len().max(1) as f64);
+        let n = format::count(n as u64);
+        output::print(&format!("{:<14}{n:>11}  {share:>8}  {}", rule.to_string(), rule.meaning()))?;
     }
     match (&args.out, left) {
         (Some(out), Some(left)) => output::print(&format!("{}: {}", out.display(), format::things(left, "Gaussian"))),

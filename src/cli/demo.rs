@@ -6,6 +6,7 @@ use super::progress::Console;
 use super::train::TrainOverrides;
 use super::{CliError, output};
 use crate::jobs::{Folders, demo as shipped, demo_tour, export};
+use crate::math::format;
 use crate::pipeline::observer::{Observer, Severity};
 
 /// Show the program on the demo scene: make photos, train, look around
@@ -87,10 +88,10 @@ fn make(file: &Path, work: &Path, mut console: Console) -> Result<(), CliError> 
     let sum = format!("{}  demo.zip\n", shipped::digest(&bytes));
     export::text(&file.with_extension("sha256"), &sum)?;
     output::print(&format!(
-        "{}: {:.1} MB, {} Gaussians, held-out PSNR {:.2} dB, SSIM {:.3}; asked by name, objects {:.3} and parts {:.3} mean IoU",
+        "{}: {}, {} Gaussians, held-out PSNR {:.2} dB, SSIM {:.3}; asked by name, objects {:.3} and parts {:.3} mean IoU",
         file.display(),
-        bytes.len() as f64 / 1e6,
-        record.gaussians,
+        format::bytes(bytes.len() as u64),
+        format::count(record.gaussians as u64),
         record.psnr,
         record.ssim,
         record.object_miou,

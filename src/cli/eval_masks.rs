@@ -7,6 +7,7 @@ use serde_json::json;
 use super::{CliError, output};
 use crate::jobs::evaluate::PhotoComparison;
 use crate::jobs::evaluate_masks::{self, Protocol, ProtocolSummary};
+use crate::math::format::count;
 use crate::math::stats::mean;
 use crate::pipeline::semantics::evaluation::Unit;
 use crate::pipeline::semantics::evaluation::part_recall::{HIT_IOU, Row};
@@ -80,6 +81,7 @@ fn summary(summary: &ProtocolSummary) -> String {
         }
         ProtocolSummary::Strokes { gaussians, prepare_secs, rows } => {
             let table = output::table(&strokes(rows));
+            let gaussians = count(*gaussians as u64);
             format!("{gaussians} Gaussians, made ready in {prepare_secs:.1} s\n{table}")
         }
         ProtocolSummary::Recipes { absent, rows } => {

@@ -12,6 +12,7 @@ use crate::io::video::{VideoEncoder, VideoSettings};
 use crate::jobs::render::{self, Quantity};
 use crate::jobs::video::{self, Video, VideoRequest};
 use crate::jobs::{Scene, export, open, plan, query};
+use crate::math::format;
 use crate::navigate::camera_spline::MOST_PICTURES;
 use crate::navigate::{CameraSpline, Speed};
 use crate::render::{BackendChoice, RenderSettings};
@@ -128,8 +129,9 @@ pub(crate) fn run(args: RenderArgs, quiet: bool) -> Result<(), CliError> {
     let [width, height] = size;
     let flat = if drawn.flat { ", surfels as flat Gaussians" } else { "" };
     output::print(&format!(
-        "{}: {width} x {height} px, drawn in {millis:.0} ms on {}{flat}{scale}",
+        "{}: {width} x {height} px, drawn in {} on {}{flat}{scale}",
         args.out.display(),
+        format::millis(millis / 1e3),
         drawn.backend
     ))
 }
@@ -183,11 +185,11 @@ fn video(args: &RenderArgs, path: &Path, quiet: bool) -> Result<(), CliError> {
         }));
     }
     output::print(&format!(
-        "{}: {} frames of {w} x {h} px, {:.1} s long, {:.1} MB, drawn in {secs:.1} s on {}",
+        "{}: {} frames of {w} x {h} px, {:.1} s long, {}, drawn in {secs:.1} s on {}",
         summary.path.display(),
         summary.frames,
         summary.secs,
-        summary.bytes as f64 / 1e6,
+        format::bytes(summary.bytes),
         backend
     ))
 }

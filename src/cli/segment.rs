@@ -12,7 +12,7 @@ use super::{CliError, number, output, view};
 use crate::io::splat_format::SplatFormat;
 use crate::jobs::export_all::{self, ExportAllRequest, ExportedAll, MaskFormat};
 use crate::jobs::{Scene, export, export_splat, query, render, segment};
-use crate::math::format::things;
+use crate::math::format::{self, things};
 use crate::pipeline::semantics::query::answer::Basis;
 use crate::scene::{Camera, LevelFilter, SemanticMap};
 
@@ -99,7 +99,8 @@ fn one(args: &SegmentArgs, text: &str, out: &Path, scene: &Scene, quiet: bool) -
     let names: Vec<String> = answered.chosen(args.top).iter().map(|id| map.identities.full_name(*id)).collect();
     let what = if args.rest { format!("all but {}", names.join(", ")) } else { names.join(", ") };
     let how = if answered.basis == Basis::Embedding { ", found by embedding, not by name" } else { "" };
-    let written = format!("{what}: {count} of {} Gaussians{how}", scene.cloud.len());
+    let [count, all] = [count, scene.cloud.len()].map(|n| format::count(n as u64));
+    let written = format!("{what}: {count} of {all} Gaussians{how}");
     output::print(
         &args.recipe.lines(&map).into_iter().chain([written]).chain(done.lines()).collect::<Vec<_>>().join("\n"),
     )

@@ -10,6 +10,7 @@ use crate::io::scene_files::SELECTION_FILE;
 use crate::jobs::edit::{self, EditRequest};
 use crate::jobs::select::{self, PrepareRequest, SelectFor, SelectRequest, SelectStep, Selected, Stroke, kept_as};
 use crate::jobs::{Scene, query};
+use crate::math::format;
 use crate::scene::{LevelFilter, Mask, NO_IDENTITY};
 
 /// Radius of a click as a share of the view's width.
@@ -101,7 +102,8 @@ pub(crate) fn run(
     let selected = selected.filter(|s| !s.gaussians.is_empty());
     let selected = selected.ok_or_else(|| CliError::failed("nothing is at the places that were clicked on"))?;
     let mut lines = Vec::new();
-    let count = format!("{} of {} Gaussians", selected.gaussians.len(), scene.cloud.len());
+    let [count, all] = [selected.gaussians.len(), scene.cloud.len()].map(|n| format::count(n as u64));
+    let count = format!("{count} of {all} Gaussians");
     if let Some(out) = out {
         let kept: Vec<usize> = selected.gaussians.iter().map(|i| *i as usize).collect();
         lines.push(count.clone());

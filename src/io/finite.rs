@@ -5,6 +5,7 @@ use std::path::Path;
 use rayon::prelude::*;
 
 use super::IoError;
+use crate::math::format::count;
 use crate::scene::{CloudError, GaussianCloud};
 
 /// Returns the cloud of a file without those of its Gaussians that have a number that is not finite; a warning counts
@@ -35,8 +36,9 @@ fn without_flaws(cloud: GaussianCloud) -> Result<GaussianCloud, CloudError> {
     }
     let mut warnings = cloud.warnings.clone();
     warnings.push(format!(
-        "{} of {n} Gaussians are left out, as numbers of theirs are not finite (first: Gaussian {at}, {field})",
-        n - kept.len()
+        "{} of {} Gaussians are left out, as numbers of theirs are not finite (first: Gaussian {at}, {field})",
+        count((n - kept.len()) as u64),
+        count(n as u64)
     ));
     Ok(GaussianCloud { warnings, ..cloud.select(&kept) })
 }

@@ -4,6 +4,8 @@ use std::sync::OnceLock;
 
 use sysinfo::{MemoryRefreshKind, ProcessRefreshKind, ProcessesToUpdate, System};
 
+use crate::math::format;
+
 /// Free memory assumed if the system does not report it; any machine can spare that much.
 const UNKNOWN: u64 = 2 << 30;
 
@@ -31,7 +33,7 @@ pub(crate) fn free() -> u64 {
 
 /// An operation that does not fit into the free memory.
 #[derive(Debug, PartialEq, Eq, thiserror::Error)]
-#[error("{what} takes about {} MB of memory, and {} MB are free; {remedy}", bytes.div_ceil(1_000_000), free / 1_000_000)]
+#[error("{what} takes about {} of memory, and {} are free; {remedy}", format::bytes(*bytes), format::bytes(*free))]
 pub struct NoRoom {
     what: String,
     bytes: u64,
@@ -98,7 +100,7 @@ mod tests {
     fn what_does_not_fit_is_refused_with_its_size() {
         assert_eq!(room("a thumbnail", 1000, ""), Ok(()));
         let e = room("a wall", u64::MAX, "make it smaller").expect_err("no machine has that").to_string();
-        assert!(e.starts_with("a wall takes about 18446744073710 MB") && e.ends_with("make it smaller"), "{e}");
+        assert!(e.starts_with("a wall takes about 18,446,744 TB") && e.ends_with("make it smaller"), "{e}");
     }
 
     #[test]

@@ -14,6 +14,7 @@ use super::evaluate::EvaluateOptions;
 use super::experiment::Experiment;
 use super::train::IfChanged;
 use super::{JobError, export, open, plan};
+use crate::math::format::count;
 use crate::math::stats::median;
 use crate::measure::studies::StudyInput;
 use crate::measure::table::{markdown, rows};
@@ -183,7 +184,7 @@ impl DemoReport {
              {:.3} and parts {:.3} mean IoU; {:.0} ms per image",
             self.steps,
             self.train_secs,
-            self.gaussians,
+            count(self.gaussians as u64),
             self.psnr,
             self.ssim,
             self.held_out,

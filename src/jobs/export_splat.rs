@@ -78,7 +78,11 @@ impl ExportedSplat {
     pub(crate) fn lines(&self) -> Vec<String> {
         let Self { path, gaussians, sh_degree, bytes, rounded, left_out, shift, turned_upright, drawn } = self;
         let size = format::bytes(*bytes);
-        let mut lines = vec![format!("{}: {gaussians} Gaussians, SH degree {sh_degree}, {size}", path.display())];
+        let mut lines = vec![format!(
+            "{}: {} Gaussians, SH degree {sh_degree}, {size}",
+            path.display(),
+            format::count(*gaussians as u64)
+        )];
         lines.extend(rounded.map(|what| format!("rounded: {what}")));
         if !left_out.is_empty() {
             lines.push(format!("not stored: {}", left_out.join("; ")));

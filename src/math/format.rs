@@ -42,8 +42,29 @@ pub(crate) fn bytes(n: u64) -> String {
     match n {
         0..1_000 => format!("{n} B"),
         1_000..1_000_000 => format!("{:.0} kB", n as f64 / 1e3),
-        1_000_000..1_000_000_000 => format!("{:.0} MB", n as f64 / 1e6),
-        _ => format!("{:.1} GB", n as f64 / 1e9),
+        1_000_000..999_500_000 => format!("{:.0} MB", n as f64 / 1e6),
+        999_500_000..1_000_000_000_000 => format!("{:.1} GB", n as f64 / 1e9),
+        _ => format!("{} TB", count((n as f64 / 1e12).round() as u64)),
+    }
+}
+
+/// Megabytes, as models state their size: "41 MB", "2.6 GB".
+pub(crate) fn megabytes(n: u64) -> String {
+    bytes(n.saturating_mul(1_000_000))
+}
+
+/// A share of 0 to 1 with two significant digits: "0.072 %", "1.5 %", "38 %".
+pub(crate) fn percent(share: f64) -> String {
+    if !share.is_finite() {
+        return NONE.into();
+    }
+    let percent = 100.0 * share;
+    // Rounded first: 9.96 is 10, not 10.0.
+    let rounded: f64 = format!("{percent:.1e}").parse().unwrap_or(percent);
+    match rounded.abs() {
+        0.0 => "0 %".into(),
+        size if size >= 10.0 => format!("{percent:.0} %"),
+        size => format!("{rounded:.*} %", (1.0 - size.log10().floor()) as usize),
     }
 }
 
@@ -70,6 +91,17 @@ pub(crate) fn about(secs: f64) -> String {
     }
 }
 
+/// A time that is estimated, with two significant digits: "32 ms", "0.65 s", "3.2 s".
+pub(crate) fn roughly(secs: f64) -> String {
+    match secs {
+        s if !s.is_finite() || s < 0.0 => NONE.into(),
+        s if s < 0.0995 => format!("{:.0} ms", s * 1e3),
+        s if s < 0.995 => format!("{s:.2} s"),
+        s if s < 9.95 => format!("{s:.1} s"),
+        s => format!("{s:.0} s"),
+    }
+}
+
 /// A measured time with four significant digits: "3.200 ms".
 pub(crate) fn seconds(secs: f64) -> String {
     match secs {
@@ -80,12 +112,12 @@ pub(crate) fn seconds(secs: f64) -> String {
     }
 }
 
-/// The time of a frame or of a step of a query: "12 ms", "1.23 ms".
+/// The time of a frame or of a step of a query: "12 ms", "1.23 ms", "2.5 s".
 pub(crate) fn millis(secs: f64) -> String {
     match secs * 1e3 {
         ms if ms < 0.1 => format!("{ms:.3} ms"),
         ms if ms < 10.0 => format!("{ms:.2} ms"),
-        ms if ms >= 1e4 => format!("{:.1} s", ms / 1e3),
+        ms if ms >= 1e3 => format!("{:.1} s", ms / 1e3),
         ms => format!("{ms:.0} ms"),
     }
 }
@@ -225,6 +257,8 @@ mod tests {
         assert_eq!([8.4, 125.0, 3725.0, f64::NAN].map(duration), ["8 s", "2:05", "1:02:05", "–"]);
         assert_eq!([12.345, 1234.0, 0.0].map(|r| rate(r, "steps")), ["12.3 steps/s", "1,234 steps/s", "–"]);
         assert_eq!([1.234e-5, 1.234e-3, 0.1234, 16.0].map(millis), ["0.012 ms", "1.23 ms", "123 ms", "16.0 s"]);
+        assert_eq!(millis(2.543), "2.5 s");
+        assert_eq!([0.0321, 0.65, 3.21, 42.0, f64::NAN].map(roughly), ["32 ms", "0.65 s", "3.2 s", "42 s", "–"]);
         assert_eq!([23.412, f64::INFINITY].map(decibel), ["23.41 dB", "–"]);
     }
 
@@ -258,6 +292,10 @@ mod tests {
     fn counts_and_sizes() {
         assert_eq!([7, 1_000, 1_234_567].map(count), ["7", "1,000", "1,234,567"]);
         assert_eq!([999, 1_500, 2_000_000, 3_500_000_000].map(bytes), ["999 B", "2 kB", "2 MB", "3.5 GB"]);
+        assert_eq!([41, 999, 1_000, 2_565].map(megabytes), ["41 MB", "999 MB", "1.0 GB", "2.6 GB"]);
+        assert_eq!(bytes(u64::MAX), "18,446,744 TB");
+        let shares = [0.0, 0.000_716_7, 0.015, 0.0996, 0.38, 1.0, f64::NAN].map(percent);
+        assert_eq!(shares, ["0 %", "0.072 %", "1.5 %", "10 %", "38 %", "100 %", "–"]);
         assert_eq!([1, 2].map(|n| things(n, "part")), ["1 part", "2 parts"]);
     }
 

@@ -12,6 +12,7 @@ use super::dialogs::{DialogAnswer, Question};
 use super::export_dialog::ExportDialog;
 use super::file_dialogs::{FileDialogs, FileRequest};
 use super::find_dialog::FindDialog;
+use super::help::HelpPage;
 use super::history::{EditStep, Editing};
 use super::keep_dialog::KeepDialog;
 use super::layout::Layout;
@@ -65,6 +66,7 @@ pub struct App {
     pub(super) asks_in_vain: bool,
     pub(super) palette: Palette,
     pub(super) sheet: bool,
+    pub(super) help: Option<HelpPage>,
     /// True once the user wants to quit while a job runs.
     pub(super) quits: bool,
     pub(super) first_page: FirstPage,
@@ -136,6 +138,7 @@ impl App {
             asks_in_vain: false,
             palette: Palette::default(),
             sheet: false,
+            help: None,
             quits: false,
             first_page: FirstPage::default(),
             photos: PhotosPane::default(),

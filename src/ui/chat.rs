@@ -8,9 +8,10 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use crossbeam_channel::{Receiver, Sender, bounded};
 use egui::{Button, Id, Key, Modifiers, Response, RichText, ScrollArea, TextEdit, Ui};
 
-use super::chat_lines::{self, ChatAnswer, Line};
+use super::chat_lines::{self, ChatAnswer, ChatClick, Line};
 pub(crate) use super::chat_model::ChatSettings;
 use super::chat_model::ModelChooser;
+use super::chat_offers::offers;
 use super::ctx::Ctx;
 use super::panes::PaneContents;
 use super::state::AppState;
@@ -20,7 +21,7 @@ use super::viewport::Viewport;
 use crate::agent::commands::{Commands, complete};
 use crate::agent::llm::Llm;
 use crate::agent::scene::{AgentScene, Effect, SceneWorld};
-use crate::agent::{AgentEvent, Awaited, Planner, Policy, Session};
+use crate::agent::{AgentEvent, Awaited, Planner, Policy, RefusalKind, Session, World};
 use crate::navigate::Pose;
 use crate::scene::resource_log::{self, ResourceKind};
 use crate::scene::{Identities, IdentityId};
@@ -33,8 +34,11 @@ const NEWS: usize = 1024;
 const MAX_LINES: usize = 400;
 /// Completions shown at once.
 const CONTINUATIONS: usize = 4;
-/// Height of the box, its completions and the buttons below the conversation, points.
-const BELOW_PT: f32 = 130.0;
+/// Least height of the box, its completions and the buttons below the conversation, points.
+const BELOW_PT: f32 = 90.0;
+
+/// Answer to what the program does, but not the chat.
+const NOT_BY_CHAT: &str = "The chat does not do this, but the program does (Ctrl+P finds it, too):";
 
 /// State of the window that the agent works on.
 pub(crate) struct Snapshot {
@@ -86,6 +90,8 @@ pub(crate) struct Chat {
     chooser: ModelChooser,
     /// Number of the scene that the last lines are about.
     scene: u64,
+    /// Height below the conversation at the last redraw, points.
+    below_pt: f32,
 }
 
 impl Chat {
@@ -205,9 +211,13 @@ impl PaneContents for Chat {
                 }
             });
         } else {
-            let height = (ui.available_height() - BELOW_PT).max(60.0);
+            let height = (ui.available_height() - self.below_pt.max(BELOW_PT)).max(60.0);
             ScrollArea::vertical().id_salt("talk").max_height(height).stick_to_bottom(true).show(ui, |ui| {
-                say = chat_lines::show(ui, &self.lines, object_thumbnails).or(say.take());
+                match chat_lines::show(ui, &self.lines, object_thumbnails) {
+                    Some(ChatClick::Say(text)) => say = Some(text),
+                    Some(ChatClick::Do(action)) => cx.ask(action),
+                    None => {}
+                }
                 if self.cancel.is_some() {
                     ui.horizontal(|ui| {
                         ui.spinner();
@@ -219,6 +229,7 @@ impl PaneContents for Chat {
                 }
             });
         }
+        let below = ui.cursor().top();
         ui.horizontal(|ui| {
             let width = (ui.available_width() - 62.0).max(80.0);
             let hint = if ready { "show me \u{2026}" } else { "Find objects first" };
@@ -264,6 +275,7 @@ impl PaneContents for Chat {
                 *self = Self::default();
             }
         });
+        self.below_pt = ui.cursor().top() - below;
         self.waiting.extend(say);
     }
 }
@@ -294,7 +306,8 @@ struct Agent {
 
 impl Agent {
     fn carry_out(&mut self, request: Request) {
-        let Request { text, snapshot, settings, cancel } = request;
+        let Request { text: said, snapshot, settings, cancel } = request;
+        let is_model = settings.use_model;
         if let Err(problem) = self.get_ready(snapshot, settings) {
             self.reply(ChatAnswer::new(&problem), [String::new(), String::new()]);
             return;
@@ -306,15 +319,31 @@ impl Agent {
             let _ = news.send(News::Event(event));
             repaint();
         };
-        let reply = session.say(world, &text, &mut on, &cancel);
+        let reply = session.say(world, &said, &mut on, &cancel);
         let transcript = [session.transcript().to_json(), session.transcript().to_markdown()];
-        let names = reply.candidates.iter().map(|id| (*id, crate::agent::World::identities(world).full_name(*id)));
+        let names = reply.candidates.iter().map(|id| (*id, World::identities(world).full_name(*id)));
         let (text, asks) = match reply.pending {
             Some(Awaited::Confirmation) => (reply.text.replace(" (yes or no)", ""), true),
             _ => (reply.text, false),
         };
-        let (candidates, refused) = (names.collect(), reply.refused);
-        self.reply(ChatAnswer { candidates, refused, asks, ..ChatAnswer::new(&text) }, transcript);
+        let candidates = names.collect();
+        let missing = match &reply.refused {
+            Some(refusal) if !is_model => match refusal.kind {
+                RefusalKind::Unclear => Some(false),
+                RefusalKind::NotFound => Some(true),
+                _ => None,
+            },
+            _ => None,
+        };
+        let identities = World::identities(world);
+        let offers = missing.map(|missing| offers(&said, identities, missing)).unwrap_or_default();
+        self.reply(
+            match offers.is_empty() {
+                true => ChatAnswer { candidates, refused: reply.refused, asks, ..ChatAnswer::new(&text) },
+                false => ChatAnswer { offers, ..ChatAnswer::new(NOT_BY_CHAT) },
+            },
+            transcript,
+        );
     }
 
     fn reply(&self, answer: ChatAnswer, transcript: [String; 2]) {

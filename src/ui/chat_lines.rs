@@ -1,14 +1,16 @@
 //! Display of the conversation: the user's sentences, the agent's steps, folded once they are answered, and the answers
 //! with their candidates.
 
-use egui::{Button, CollapsingHeader, RichText, Ui};
+use egui::{Button, CollapsingHeader, Label, RichText, Ui};
 
+use super::keys;
 use super::panes::object_thumbnails::ObjectThumbnails;
 use super::state::Tone;
 use super::theme;
 use crate::agent::{Refusal, RefusalKind};
 use crate::math::format::things;
 use crate::scene::{IdentityId, text};
+use crate::ui::actions::Action;
 
 /// Side of a candidate's thumbnail, points.
 const THUMBNAIL_PX: f32 = 34.0;
@@ -32,6 +34,15 @@ pub(super) struct ChatAnswer {
     pub(super) refused: Option<Refusal>,
     /// True if it is a question to be answered by yes or no.
     pub(super) asks: bool,
+    /// Actions that do what the chat does not do, with their names.
+    pub(super) offers: Vec<(Action, String)>,
+}
+
+/// Click on a line of the conversation.
+pub(super) enum ChatClick {
+    /// A sentence to be said.
+    Say(String),
+    Do(Action),
 }
 
 impl ChatAnswer {
@@ -46,8 +57,8 @@ pub(super) fn did(line: &str, done: Option<bool>) -> Line {
     Line::Did(text::line(line).into_owned(), done)
 }
 
-/// Draws all lines; returns the candidate that was clicked.
-pub(super) fn show(ui: &mut Ui, lines: &[Line], object_thumbnails: &ObjectThumbnails) -> Option<String> {
+/// Draws all lines; returns what was clicked.
+pub(super) fn show(ui: &mut Ui, lines: &[Line], object_thumbnails: &ObjectThumbnails) -> Option<ChatClick> {
     let mut clicked = None;
     let mut rest = lines;
     let opened = lines.iter().rposition(|line| matches!(line, Line::Opened(_))).unwrap_or(0);
@@ -65,8 +76,14 @@ pub(super) fn show(ui: &mut Ui, lines: &[Line], object_thumbnails: &ObjectThumbn
             }
             (_, Some(Line::Answer(answer))) => {
                 clicked = rest.get(steps).and_then(|line| show_line(ui, line, object_thumbnails, can)).or(clicked);
-                // What the answer says already is no step.
-                let is_new = |line: &&Line| !matches!(line, Line::Did(text, _) if answer.text.contains(text.trim()));
+                // What the answer says already is no step, and neither is what it refuses.
+                let refused = answer.refused.as_ref().map_or("", |r| r.text.as_str());
+                let is_new = |line: &&Line| match line {
+                    Line::Did(text, done) => {
+                        *done != Some(false) && ![&answer.text, refused].iter().any(|t| t.contains(text.trim()))
+                    }
+                    _ => true,
+                };
                 let told: Vec<&Line> = rest[..steps].iter().filter(is_new).collect();
                 let calls = told.iter().filter(|line| matches!(line, Line::Did(_, None))).count();
                 if calls > 0 {
@@ -93,8 +110,8 @@ struct CanAnswer {
     confirm: bool,
 }
 
-/// Draws one line; returns the answer that was clicked.
-fn show_line(ui: &mut Ui, line: &Line, object_thumbnails: &ObjectThumbnails, can: CanAnswer) -> Option<String> {
+/// Draws one line; returns what was clicked.
+fn show_line(ui: &mut Ui, line: &Line, object_thumbnails: &ObjectThumbnails, can: CanAnswer) -> Option<ChatClick> {
     let mut clicked = None;
     match line {
         Line::Said(text) => {
@@ -110,19 +127,26 @@ fn show_line(ui: &mut Ui, line: &Line, object_thumbnails: &ObjectThumbnails, can
             ui.separator();
             ui.label(RichText::new(format!("{} opened", text::elided(name, 48))).small().color(theme::weak()));
         }
-        Line::Answer(ChatAnswer { text, candidates, refused, asks }) => {
-            ui.horizontal_wrapped(|ui| {
+        Line::Answer(ChatAnswer { text, candidates, refused, asks, offers }) => {
+            // Top-aligned and one label: all lines have the same leading.
+            ui.horizontal_top(|ui| {
                 // What the user stopped is no failure.
                 if refused.as_ref().is_some_and(|r| r.kind != RefusalKind::Stopped) {
                     theme::mark(ui, Tone::Warning, 16.0);
                 }
-                ui.label(text);
+                ui.add(Label::new(text.trim_end()).wrap());
             });
+            for (action, name) in offers {
+                let button = Button::new(name).shortcut_text(keys::label(ui.ctx(), action));
+                if ui.add_enabled(can.choose, button).on_hover_text(action.tooltip()).clicked() {
+                    clicked = Some(ChatClick::Do(action.clone()));
+                }
+            }
             if *asks && can.confirm {
                 ui.horizontal(|ui| {
                     for answer in ["Yes", "No"] {
                         if ui.button(answer).clicked() {
-                            clicked = Some(answer.to_lowercase());
+                            clicked = Some(ChatClick::Say(answer.to_lowercase()));
                         }
                     }
                 });
@@ -134,7 +158,7 @@ fn show_line(ui: &mut Ui, line: &Line, object_thumbnails: &ObjectThumbnails, can
                             object_thumbnails.show(ui, *id, THUMBNAIL_PX);
                         }
                         if ui.add_enabled(can.choose, Button::new(name).small()).clicked() {
-                            clicked = Some(name.clone());
+                            clicked = Some(ChatClick::Say(name.clone()));
                         }
                     }
                 });

@@ -15,6 +15,9 @@ const NARROW_PT: f32 = 1000.0;
 /// Least share of a row or column that the view keeps.
 const VIEW_SHARE: f32 = 0.4;
 
+/// Redraws in which a tab is scrolled into sight: its place is known after the first.
+const REVEALS: u8 = 4;
+
 /// Content of one tile.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub(crate) enum Place {
@@ -30,6 +33,12 @@ pub struct Dock {
     narrow: Tree<Place>,
     /// Panes detached into windows.
     detached: Vec<Pane>,
+    /// Tabs in front at the last redraw.
+    #[serde(skip)]
+    front: Vec<TileId>,
+    /// Tabs that have come to the front and are to be scrolled into sight, with the redraws left for it.
+    #[serde(skip)]
+    hidden: Vec<(TileId, u8)>,
 }
 
 /// Contents that the dock draws.
@@ -42,7 +51,7 @@ pub(crate) trait DockContents {
 
 impl Default for Dock {
     fn default() -> Self {
-        Self { wide: wide(), narrow: narrow(), detached: Vec::new() }
+        Self { wide: wide(), narrow: narrow(), detached: Vec::new(), front: Vec::new(), hidden: Vec::new() }
     }
 }
 
@@ -137,10 +146,18 @@ impl Dock {
             tree.set_visible(id, contents.has(place) && !is_apart);
         }
         give_room(tree, size);
-        let mut shown = Shown { contents, view: tree.tiles.find_pane(&Place::View), detach: None };
+        let front = tree.active_tiles();
+        self.hidden.extend(front.iter().filter(|id| !self.front.contains(id)).map(|id| (*id, REVEALS)));
+        self.hidden.retain(|(id, left)| *left > 0 && front.contains(id));
+        let hidden = &mut self.hidden;
+        let mut shown = Shown { contents, view: tree.tiles.find_pane(&Place::View), detach: None, hidden };
         tree.ui(&mut shown, ui);
+        self.front = front;
         if let Some(pane) = shown.detach {
             self.detach(pane, true);
+        }
+        if !self.hidden.is_empty() {
+            ui.ctx().request_repaint();
         }
     }
 
@@ -193,6 +210,7 @@ struct Shown<'a> {
     /// The tile of the view.
     view: Option<TileId>,
     detach: Option<Pane>,
+    hidden: &'a mut Vec<(TileId, u8)>,
 }
 
 impl Shown<'_> {
@@ -226,8 +244,15 @@ impl Behavior<Place> for Shown<'_> {
 
     fn on_tab_button(&mut self, tiles: &mut Tiles<Place>, id: TileId, button: Response) -> Response {
         let Some(Place::Pane(pane)) = tiles.get_pane(&id).copied() else { return button };
+        if let Some((_, left)) = self.hidden.iter_mut().find(|(of, _)| *of == id) {
+            // A tab that comes to the front shows all of its name.
+            *left = left.saturating_sub(1);
+            if button.interact_rect.width() < button.rect.width() - 1.0 {
+                button.scroll_to_me_animation(None, egui::style::ScrollAnimation::none());
+            }
+        }
         button.context_menu(|ui| self.menu(ui, pane));
-        button.on_hover_text("Drag to move, right-click for more")
+        button.on_hover_text(format!("{}: drag to move, right-click for more", pane.text()))
     }
 
     fn top_bar_right_ui(&mut self, tiles: &Tiles<Place>, ui: &mut Ui, _: TileId, tabs: &Tabs, _: &mut f32) {

@@ -9,7 +9,7 @@ use super::theme;
 use crate::jobs::find_objects::forecast::{self, InferenceEstimate};
 use crate::jobs::find_objects::{FindSettings, NO_ENCODER};
 use crate::jobs::models::{ModelEntry, ModelList, ModelRole, ModelState};
-use crate::math::format::things;
+use crate::math::format::{megabytes, things};
 use crate::pipeline::semantics::lifting::build_map::{MaskPropagation, REGIONS};
 use crate::scene::Preparation;
 use crate::ui::actions::{Action, Pane};
@@ -217,9 +217,12 @@ fn offered(
 /// Download size and license of a model.
 fn download(known: &ModelList, entry: &ModelEntry) -> String {
     match known.to_load(entry) {
-        _ if !entry.is_hosted() => format!("not hosted anywhere; {} MB, {}", entry.megabytes(), entry.license),
-        [all, 0] => format!("download of {all} MB, {}", entry.license),
-        [left, arrived] => format!("download of {left} MB more, {arrived} MB are here already, {}", entry.license),
+        _ if !entry.is_hosted() => format!("not hosted anywhere; {}, {}", megabytes(entry.megabytes()), entry.license),
+        [all, 0] => format!("download of {}, {}", megabytes(all), entry.license),
+        [left, arrived] => {
+            let [left, arrived] = [left, arrived].map(megabytes);
+            format!("download of {left} more, {arrived} are here already, {}", entry.license)
+        }
     }
 }
 
@@ -231,7 +234,7 @@ fn missing_engine(known: &ModelList) -> Option<&ModelEntry> {
 
 /// A radio button with its explanation below; returns true if it was clicked.
 fn choice(ui: &mut Ui, chosen: bool, title: &str, means: &str, costs: &str) -> bool {
-    let clicked = ui.radio(chosen, title).clicked();
+    let clicked = theme::outlined(ui, |ui| ui.radio(chosen, title).clicked());
     ui.indent(title, |ui| {
         ui.label(RichText::new(means).small().color(theme::weak()));
         if !costs.is_empty() {
@@ -244,10 +247,10 @@ fn choice(ui: &mut Ui, chosen: bool, title: &str, means: &str, costs: &str) -> b
 /// Summary of the next steps: sizes, times, and the effect of the encoder on queries.
 fn summary(ui: &mut Ui, known: &ModelList, means: &Means, most_photos: usize, is_fast: bool) {
     let missing = means.missing.iter().filter_map(|id| known.get(id));
-    let megabytes: u64 = missing.map(|(e, _)| known.to_load(e)[0]).sum();
+    let to_load: u64 = missing.map(|(e, _)| known.to_load(e)[0]).sum();
     let mut parts = Vec::new();
-    if megabytes > 0 {
-        parts.push(format!("Download {megabytes} MB."));
+    if to_load > 0 {
+        parts.push(format!("Download {}.", megabytes(to_load)));
     }
     parts.extend(
         InferenceEstimate::of(&means.segmenter, known, is_fast).map(|look| forecast::sentence(look, most_photos)),

@@ -9,7 +9,7 @@ use std::sync::Arc;
 
 use crate::jobs::edit::EditRequest;
 use crate::jobs::rearrange::{Placement, SplatEdit};
-use crate::math::format::things;
+use crate::math::format::{count, things};
 use crate::pipeline::semantics::lifting::edit::Edit;
 use crate::pipeline::semantics::query::recipe::QueryConfig;
 use crate::scene::measurement::{Measurement, change_text};
@@ -256,7 +256,7 @@ fn shown_text(before: &BTreeSet<IdentityId>, now: &BTreeSet<IdentityId>, all: &I
     let named = |ids: BTreeSet<IdentityId>| match outermost(&ids).as_slice() {
         [one] => all.full_name(*one),
         [one, other] => format!("{} and {}", all.full_name(*one), all.full_name(*other)),
-        more => format!("{} objects and parts", more.len()),
+        more => format!("{} objects and parts", count(more.len() as u64)),
     };
     let (gone, back): (BTreeSet<_>, BTreeSet<_>) = (now - before, before - now);
     match (gone.is_empty(), back.is_empty()) {

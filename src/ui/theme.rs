@@ -2,12 +2,19 @@
 
 use std::cell::Cell;
 
+use egui::theme::{DefaultStyle, StyleProvider};
+use egui::widget_style::{CheckboxStyle, StyleArgs};
 use egui::{
     Area, Color32, CornerRadius, FontId, Id, InnerResponse, Margin, Modal, Order, RichText, Stroke, Style, TextStyle,
     Theme, Ui, Visuals, vec2,
 };
 
 use super::state::Tone;
+
+/// Room beside content that scrolls, points.
+const GUTTER_PT: f32 = 10.0;
+/// Height of a chip, points.
+const CHIP_PT: f32 = 19.0;
 
 /// The colors of a theme.
 #[derive(Clone, Copy)]
@@ -22,6 +29,8 @@ struct Colors {
     hovered: Color32,
     pressed: Color32,
     line: Color32,
+    /// Outline of check boxes; contrast of at least 3 : 1 on a pane.
+    outline: Color32,
     text: Color32,
     /// Emphasized text.
     strong: Color32,
@@ -44,6 +53,7 @@ const DARK: Colors = Colors {
     hovered: Color32::from_rgb(0x2c, 0x30, 0x38),
     pressed: Color32::from_rgb(0x36, 0x3b, 0x45),
     line: Color32::from_rgb(0x2e, 0x32, 0x3a),
+    outline: Color32::from_rgb(0x70, 0x76, 0x82),
     text: Color32::from_rgb(0xd9, 0xdc, 0xe2),
     strong: Color32::WHITE,
     weak: Color32::from_rgb(0x93, 0x99, 0xa5),
@@ -62,6 +72,7 @@ const LIGHT: Colors = Colors {
     hovered: Color32::from_rgb(0xd9, 0xde, 0xe6),
     pressed: Color32::from_rgb(0xc9, 0xd1, 0xdd),
     line: Color32::from_rgb(0xcd, 0xd2, 0xda),
+    outline: Color32::from_rgb(0x7c, 0x84, 0x92),
     text: Color32::from_rgb(0x24, 0x28, 0x30),
     strong: Color32::BLACK,
     weak: Color32::from_rgb(0x5a, 0x62, 0x70),
@@ -133,6 +144,33 @@ pub(crate) fn install(ctx: &egui::Context) {
     for theme in [Theme::Dark, Theme::Light] {
         ctx.style_mut_of(theme, |style| style_in(style, theme));
     }
+    ctx.replace_widget_theme::<CheckboxStyle>(OutlinedBox);
+}
+
+/// Check boxes with an outline: without their mark they would be invisible.
+struct OutlinedBox;
+
+impl StyleProvider<CheckboxStyle> for OutlinedBox {
+    fn style(&mut self, args: &StyleArgs<'_>) -> CheckboxStyle {
+        let mut style: CheckboxStyle = DefaultStyle.style(args);
+        style.checkbox_frame.stroke = Stroke::new(1.0, outline(args.style));
+        style
+    }
+}
+
+/// The outline of check boxes and radio buttons in the theme of a style.
+fn outline(style: &Style) -> Color32 {
+    colors_of(Theme::from_dark_mode(style.visuals.dark_mode)).outline
+}
+
+/// Draws radio buttons with an outline like that of check boxes.
+pub(crate) fn outlined<T>(ui: &mut Ui, add: impl FnOnce(&mut Ui) -> T) -> T {
+    ui.scope(|ui| {
+        let stroke = Stroke::new(1.0, outline(ui.style()));
+        ui.visuals_mut().widgets.inactive.bg_stroke = stroke;
+        add(ui)
+    })
+    .inner
 }
 
 fn style_in(style: &mut Style, theme: Theme) {
@@ -158,6 +196,8 @@ fn spacing(style: &mut Style) {
     s.window_margin = Margin::same(16);
     s.slider_width = 130.0;
     s.scroll.floating = true;
+    // A scroll bar has room of its own: it covers neither digits nor text.
+    s.scroll.floating_allocated_width = GUTTER_PT;
 }
 
 fn visuals(theme: Theme) -> Visuals {
@@ -230,6 +270,17 @@ pub(crate) fn section(ui: &mut Ui, title: &str) {
     ui.label(RichText::new(title).small().strong().color(weak()));
 }
 
+/// Draws a label with chips beside it; those that do not fit go on below the first.
+pub(crate) fn hanging<T>(ui: &mut Ui, label: RichText, chips: impl FnOnce(&mut Ui) -> T) -> T {
+    ui.horizontal_top(|ui| {
+        ui.spacing_mut().interact_size.y = CHIP_PT;
+        ui.spacing_mut().item_spacing.y = 4.0;
+        ui.horizontal(|ui| ui.label(label));
+        ui.horizontal_wrapped(chips).inner
+    })
+    .inner
+}
+
 /// A round mark in the color of a message.
 pub(crate) fn mark(ui: &mut Ui, tone: Tone, size: f32) {
     let (rect, _) = ui.allocate_exact_size(egui::Vec2::splat(size), egui::Sense::hover());
@@ -272,7 +323,7 @@ pub(crate) fn overlay() -> egui::Frame {
         .fill(COLORS.get().overlay)
         .stroke(Stroke::new(1.0, line()))
         .corner_radius(8)
-        .inner_margin(Margin::symmetric(8, 5))
+        .inner_margin(Margin { left: 8, right: 8, top: 5, bottom: 7 })
 }
 
 #[cfg(test)]
@@ -307,6 +358,7 @@ mod tests {
                 }
             }
             assert!(contrast(c.text, c.surface) >= 7.0 && contrast(c.on_accent, c.accent) >= 4.5);
+            assert!(contrast(c.outline, c.panel) >= 3.0 && contrast(c.outline, c.surface) >= 2.5);
         }
         // Control: unreadable colors are detected.
         assert!(contrast(DARK.line, DARK.panel) < 2.0);

@@ -1,58 +1,133 @@
-//! Messages that disappear by themselves.
+//! Messages on one line of the status bar: the newest one, which disappears by itself. The log keeps all.
 
 use std::collections::HashMap;
 
-use egui::{Align2, Area, Id, Order};
+use egui::{Align, Align2, Area, Button, Frame, Id, Label, Layout, Margin, Order, RichText, Ui, vec2};
 
-use super::state::{AppState, Tone};
+use super::state::{AppState, Toast, Tone};
 use super::theme;
 
-/// Display time of a message, s; longer for warnings and errors.
+/// Display time of a message, s; longer for warnings. Errors stay.
 const STAY_SECS: f64 = 4.0;
 const STAY_LONG_SECS: f64 = 9.0;
-/// Largest number of messages on screen.
-const MOST: usize = 4;
+/// Width of the line where it floats over a view that fills the window, points.
+const FLOATING_PT: f32 = 560.0;
 
+/// Answer of the user to a message.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum ToastClick {
+    Dismiss,
+    OpenLog,
+}
+
+/// When each message was first seen.
 #[derive(Default)]
 pub(crate) struct Toasts {
     since: HashMap<u64, f64>,
 }
 
 impl Toasts {
-    /// Draws the newest messages at the lower right of `area` and drops expired ones.
-    pub(crate) fn show(&mut self, ctx: &egui::Context, state: &mut AppState, area: egui::Rect) {
+    /// Drops messages whose time is over. An error stays until it is dismissed, or read in the log.
+    pub(crate) fn update(&mut self, ctx: &egui::Context, state: &mut AppState, log_is_open: bool) {
         let now = ctx.input(|i| i.time);
-        let stay = |tone| if matches!(tone, Tone::Info | Tone::Good) { STAY_SECS } else { STAY_LONG_SECS };
-        state.toasts.retain(|t| now - *self.since.entry(t.id).or_insert(now) < stay(t.tone));
+        let mut next = f64::INFINITY;
+        state.toasts.retain(|toast| {
+            let left = match toast.tone {
+                Tone::Info | Tone::Good => STAY_SECS,
+                Tone::Warning => STAY_LONG_SECS,
+                Tone::Error => return !log_is_open,
+            } - (now - *self.since.entry(toast.id).or_insert(now));
+            next = next.min(if left > 0.0 { left } else { f64::INFINITY });
+            left > 0.0
+        });
         self.since.retain(|id, _| state.toasts.iter().any(|t| t.id == *id));
-        let mut dismissed = None;
-        let mut y = area.bottom() - 14.0;
-        for toast in state.toasts.iter().rev().take(MOST) {
-            let shown = Area::new(Id::unique(("toast", toast.id)))
-                .order(Order::Foreground)
-                .sense(egui::Sense::click())
-                .pivot(Align2::RIGHT_BOTTOM)
-                .fixed_pos(egui::pos2(area.right() - 14.0, y))
-                .show(ctx, |ui| {
-                    ui.set_max_width(420.0);
-                    let color = theme::tone_color(toast.tone);
-                    theme::overlay().stroke(egui::Stroke::new(1.0, color.gamma_multiply(0.6))).inner_margin(12).show(
-                        ui,
-                        |ui| {
-                            ui.horizontal(|ui| {
-                                theme::mark(ui, toast.tone, 18.0);
-                                ui.label(&toast.text);
-                            });
-                        },
-                    );
-                });
-            if shown.response.clone().on_hover_text("Click to dismiss").clicked() {
-                dismissed = Some(toast.id);
-            }
-            y -= shown.response.rect.height() + 8.0;
-            let left = stay(toast.tone) - (now - self.since.get(&toast.id).copied().unwrap_or(now));
-            ctx.request_repaint_after_secs(left.max(0.05) as f32);
+        if next.is_finite() {
+            ctx.request_repaint_after_secs(next.max(0.05) as f32);
         }
-        state.toasts.retain(|t| Some(t.id) != dismissed);
+    }
+}
+
+/// Draws the newest message in the room that is left in a row.
+pub(crate) fn show(ui: &mut Ui, toasts: &[Toast]) -> Option<ToastClick> {
+    let newest = toasts.last()?;
+    let color = theme::tone_color(newest.tone);
+    let frame = Frame::new().fill(color.gamma_multiply(0.12)).corner_radius(6).inner_margin(Margin::symmetric(8, 0));
+    let mut clicked = None;
+    frame.show(ui, |ui| {
+        ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
+            let close = ui.add(Button::new("\u{d7}").small().frame(false)).on_hover_text("Dismiss");
+            if close.accessible_name("Dismiss the message").clicked() {
+                clicked = Some(ToastClick::Dismiss);
+            }
+            let others = toasts.len() - 1;
+            if others > 0 {
+                let link = ui.link(RichText::new(format!("{others} more in the log")).small());
+                if link.on_hover_text("Warnings that came before").clicked() {
+                    clicked = Some(ToastClick::OpenLog);
+                }
+            }
+            ui.with_layout(Layout::left_to_right(Align::Center), |ui| {
+                theme::mark(ui, newest.tone, 16.0);
+                let text = newest.text.replace('\n', " ");
+                ui.add(Label::new(text).truncate());
+            });
+        });
+    });
+    clicked
+}
+
+/// Draws it over a view that fills the window, which has no status bar.
+pub(crate) fn float(ctx: &egui::Context, toasts: &[Toast]) -> Option<ToastClick> {
+    let width = FLOATING_PT.min(ctx.content_rect().width() - 40.0);
+    let area = Area::new(Id::unique("message")).order(Order::Foreground);
+    // Above the cards at the bottom of the view.
+    let area = area.anchor(Align2::CENTER_BOTTOM, vec2(0.0, -64.0));
+    let row = |ui: &mut Ui| {
+        let size = vec2(width, ui.spacing().interact_size.y);
+        ui.allocate_ui_with_layout(size, Layout::left_to_right(Align::Center), |ui| show(ui, toasts)).inner
+    };
+    (!toasts.is_empty()).then(|| theme::card(ctx, area, row).inner).flatten()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Texts that are left after the window has run until `secs`.
+    fn left(toasts: &mut Toasts, state: &mut AppState, secs: f64, log_is_open: bool) -> Vec<String> {
+        let ctx = egui::Context::default();
+        let input = egui::RawInput { time: Some(secs), ..egui::RawInput::default() };
+        ctx.run_ui(input, |ui| toasts.update(ui.ctx(), state, log_is_open)).textures_delta.clear();
+        state.toasts.iter().map(|t| t.text.clone()).collect()
+    }
+
+    #[test]
+    fn past_events_are_replaced_and_warnings_are_kept_for_their_time() {
+        let (mut toasts, mut state) = (Toasts::default(), AppState::default());
+        state.toast(Tone::Warning, "17 photos are missing");
+        state.toast(Tone::Info, "Showed only the mug");
+        state.toast(Tone::Good, "Showed everything");
+        assert_eq!(left(&mut toasts, &mut state, 1.0, false), ["17 photos are missing", "Showed everything"]);
+        state.toast(Tone::Info, "Undone: showed everything");
+        state.toast(Tone::Info, "Undone: showed everything");
+        assert_eq!(left(&mut toasts, &mut state, 2.0, false), ["17 photos are missing", "Undone: showed everything"]);
+        assert_eq!(left(&mut toasts, &mut state, 6.5, false), ["17 photos are missing"]);
+        assert!(left(&mut toasts, &mut state, 10.5, false).is_empty());
+        // Control: the log keeps every one of them.
+        assert_eq!(state.log.len(), 5);
+    }
+
+    #[test]
+    fn an_error_stays_until_it_is_read() {
+        let (mut toasts, mut state) = (Toasts::default(), AppState::default());
+        state.toast(Tone::Error, "The disk is full");
+        state.toast(Tone::Info, "Showed RGB");
+        assert_eq!(left(&mut toasts, &mut state, 1.0, false).len(), 2);
+        assert_eq!(left(&mut toasts, &mut state, 1e4, false), ["The disk is full"]);
+        assert!(left(&mut toasts, &mut state, 1e4, true).is_empty());
+        // Control: what is no error does not stay, and is not ended by the log.
+        state.toast(Tone::Warning, "a.jpg is empty");
+        assert_eq!(left(&mut toasts, &mut state, 1e4 + 1.0, true).len(), 1);
+        assert!(left(&mut toasts, &mut state, 2e4, false).is_empty());
     }
 }

@@ -93,7 +93,7 @@ impl DetailLevels {
             let build = || lod::build(&cloud, proceed);
             let built = low_priority_pool::pool().map_or_else(build, |pool| pool.install(build));
             if let Some(built) = built {
-                let what = format!("levels of detail of {} Gaussians", cloud.len());
+                let what = format!("levels of detail of {}", crate::math::format::things(cloud.len(), "Gaussian"));
                 resource_log::record(ResourceKind::Levels, what, "they are too many to draw in time", built.bytes());
                 // No other code sets it.
                 let _ = tree.set(Arc::new(built));

@@ -72,6 +72,7 @@ pub(super) fn task(id: &str, slots: &Slots) -> Option<CommandStep> {
         "approach" => go(CLOSER)?,
         "retreat" => go(FARTHER)?,
         "from_side_of" | "go_to" => go(NORMAL)?,
+        "behind" => ToolCall::GoTo { target: thing(0)?, side: Side::Other, closeness: NORMAL },
         _ => return None,
     }))
 }

@@ -173,7 +173,7 @@ fn print_answer(args: &QueryArgs, text: &str, map: &SemanticMap, result: &QueryR
             let seen = match mask.area() {
                 0 if is_empty => "empty: no Gaussians belong to it".to_owned(),
                 0 => "not in this view (--camera looks from another photo)".to_owned(),
-                n => format!("{n} px in this view"),
+                n => format!("{} px in this view", crate::math::format::count(n as u64)),
             };
             let mended = mended_text(&reading.mended).map(|t| format!("\n{t}")).unwrap_or_default();
             let ignored = if ignored.is_empty() { String::new() } else { format!("\nignored: {}", ignored.join(", ")) };

@@ -41,7 +41,7 @@ impl InferenceEstimate {
 
     /// Returns the time in words for one `what`: a photo, a picture of an object.
     pub(crate) fn text(self, what: &str) -> String {
-        let time = if self.secs < 5.0 { format::seconds(self.secs) } else { format::about(self.secs) };
+        let time = if self.secs < 5.0 { format::roughly(self.secs) } else { format::about(self.secs) };
         format!("{time} {what} here, by estimate")
     }
 }

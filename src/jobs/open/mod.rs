@@ -394,7 +394,7 @@ fn compact(cloud: GaussianCloud) -> (Arc<GaussianCloud>, u8) {
     let cloud = cloud.up_to_degree(used);
     resource_log::record(
         ResourceKind::Gaussians,
-        format!("{} Gaussians", cloud.len()),
+        crate::math::format::things(cloud.len(), "Gaussian"),
         "the scene was opened",
         cloud.bytes(),
     );

@@ -228,15 +228,15 @@ impl ModelEntry {
 
     /// Describes the source and the size of a model that is not installed.
     pub(crate) fn origin(&self) -> String {
-        let (license, megabytes) = (&self.license, self.megabytes());
+        let (license, size) = (&self.license, crate::math::format::megabytes(self.megabytes()));
         match &self.checkpoint {
             Some(official) => format!(
-                "From its makers ({}; {license}), made into {megabytes} MB here. This address has not been tried yet.",
+                "From its makers ({}; {license}), made into {size} here. This address has not been tried yet.",
                 official.url
             ),
             None if self.url.is_some() => String::new(),
             None => format!(
-                "Its files are not hosted yet ({megabytes} MB, {license}). tools/export creates them from the official \
+                "Its files are not hosted yet ({size}, {license}). tools/export creates them from the official \
                  checkpoint."
             ),
         }

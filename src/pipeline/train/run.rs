@@ -19,6 +19,7 @@ use super::window::StepWindow;
 use super::{TrainConfig, TrainView, coarse, density, geometry, init};
 use crate::io::SceneFolder;
 use crate::io::trained::{History, SceneInfo};
+use crate::math::format::count;
 use crate::math::stats::median;
 use crate::pipeline::evaluate::scores;
 use crate::pipeline::observer::{Evaluation, Observer, Severity, Ticker};
@@ -203,7 +204,7 @@ impl<'a> Job<'a> {
             observer.note(Severity::Info, format!("Continuing at step {} of {}", self.trainer.step, self.config.steps));
         }
         if self.trainer.cloud.len() > self.trainer.budget {
-            let (have, may) = (self.trainer.cloud.len(), self.trainer.budget);
+            let [have, may] = [self.trainer.cloud.len(), self.trainer.budget].map(|n| count(n as u64));
             observer.note(
                 Severity::Warning,
                 format!("{have} Gaussians to start from are over the budget of {may}; none will be added"),
@@ -267,7 +268,7 @@ impl<'a> Job<'a> {
         let results = self.trainer.advance(views).map_err(|e| self.failed(e))?;
         for result in &results {
             if result.skipped > 0 && self.trainer.step % 100 == 0 {
-                let text = format!("{} Gaussians had a gradient that is not finite", result.skipped);
+                let text = format!("{} Gaussians had a gradient that is not finite", count(result.skipped as u64));
                 observer.note(Severity::Warning, text);
             }
             self.outliers += result.outliers as u64;

@@ -18,6 +18,7 @@ pub(super) mod window;
 
 use super::actions::{Action, action_table};
 use super::app::App;
+use super::help::HelpPage;
 use super::history::EditStep;
 use super::viewport::overrides::RenderOverrides;
 use crate::jobs::train::IfChanged;

@@ -277,6 +277,9 @@ macro_rules! action_table {
                 => app.layout.times = !app.layout.times;
             Palette: "Command palette", "Find and run any action by name.", "Ctrl+P" => app.palette.toggle();
             Shortcuts: "Keyboard shortcuts", "List every key and mouse gesture.", "F1" => app.sheet = !app.sheet;
+            Guide: "Guide", "What each pane and tool does; works without a network." => app.help = Some(HelpPage::Guide);
+            News: "What is new", "Changes of this version and of those before." => app.help = Some(HelpPage::News);
+            About: "About FMLGS", "Version and license." => app.help = Some(HelpPage::About);
             Quit: "Quit", "Close the window. A running training keeps its last checkpoint.", "Ctrl+Q"
                 => ctx.send_viewport_cmd(egui::ViewportCommand::Close);
         }

@@ -8,21 +8,26 @@ use crate::ui::app::App;
 use crate::ui::ctx::Ctx;
 use crate::ui::dialogs;
 use crate::ui::dock::{DockContents, Place};
+use crate::ui::help;
 use crate::ui::palette::shortcut_sheet;
 use crate::ui::panes::log::LogPane;
 use crate::ui::panes::plan::PlanPane;
 use crate::ui::panes::query::QueryPane;
 use crate::ui::panes::{PaneContents, bars, problems, unposed};
 use crate::ui::theme;
+use crate::ui::toasts::{self, ToastClick};
 use crate::ui::viewport::query::closed;
 
 /// The window's bars and panes.
 pub(super) fn panes(app: &mut App, ui: &mut Ui) {
+    app.toasts.update(ui.ctx(), &mut app.state, app.layout.shows(Pane::Log));
     let bar = Frame::new().fill(theme::panel()).inner_margin(Margin::symmetric(10, 6));
     if !fills_window(app) {
         let (mut cx, viewport) = app.context();
         Panel::top("menus").frame(bar).show(ui, |ui| bars::top(ui, &mut cx, viewport));
-        Panel::bottom("status").frame(bar).show(ui, |ui| bars::status(ui, &mut cx, viewport.picture()));
+        let status = Panel::bottom("status").frame(bar);
+        let clicked = status.show(ui, |ui| bars::status(ui, &mut cx, viewport.picture())).inner;
+        message_clicked(app, clicked);
     }
     problems::show(ui, &mut app.state);
     CentralPanel::no_frame().frame(Frame::new().fill(theme::canvas())).show(ui, |ui| {
@@ -46,6 +51,7 @@ pub(super) fn over_everything(app: &mut App, ctx: &egui::Context) {
         app.ask(action);
     }
     shortcut_sheet(ctx, &mut app.sheet);
+    help::show(ctx, &mut app.help);
     let answer = app.question.as_ref().and_then(|(question, _)| question.show(ctx));
     if let Some((answer, (_, then))) = answer.zip(app.question.take_if(|_| answer.is_some())) {
         then(app, answer);
@@ -67,7 +73,18 @@ pub(super) fn over_everything(app: &mut App, ctx: &egui::Context) {
         // The view and the dialogs of this frame are drawn already.
         ctx.request_repaint();
     }
-    app.toasts.show(ctx, &mut app.state, ctx.content_rect().shrink2(egui::vec2(0.0, 44.0)));
+    if fills_window(app) {
+        let clicked = toasts::float(ctx, &app.state.toasts);
+        message_clicked(app, clicked);
+    }
+}
+
+fn message_clicked(app: &mut App, clicked: Option<ToastClick>) {
+    match clicked {
+        Some(ToastClick::Dismiss) => drop(app.state.toasts.pop()),
+        Some(ToastClick::OpenLog) => app.ask(Action::ShowPane(Pane::Log)),
+        None => {}
+    }
 }
 
 /// True if the view fills the window.

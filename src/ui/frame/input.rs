@@ -27,7 +27,7 @@ pub(super) fn take(app: &mut App, ctx: &Context) {
         egui::Popup::close_all(ctx);
     }
     query::follow_vain_query(app, ctx);
-    if !app.palette.is_open() && !has_dialog && !app.sheet && !has_menu {
+    if !app.palette.is_open() && !has_dialog && !app.sheet && app.help.is_none() && !has_menu {
         // While something is measured, Enter keeps it.
         let keeps = !keys::is_typing(ctx) && app.viewport.is_measuring();
         if keeps

@@ -2,11 +2,12 @@
 
 use std::time::{Duration, Instant};
 
-use egui::{Align, Button, RichText, Stroke, Ui, vec2};
+use egui::{Align, Button, Layout, RichText, Stroke, Ui, vec2};
 use strum::VariantArray;
 
 use super::super::ctx::Ctx;
 use super::super::state::RunningJob;
+use super::super::toasts::{self, ToastClick};
 use super::super::viewport::Viewport;
 use super::super::{keys, theme};
 use crate::math::format;
@@ -157,8 +158,13 @@ pub(crate) fn top(ui: &mut Ui, cx: &mut Ctx<'_>, view: &Viewport) {
         });
         ui.menu_button("Help", |ui| {
             ui.set_min_width(240.0);
-            item(ui, true, None, Action::Palette, cx);
-            item(ui, true, None, Action::Shortcuts, cx);
+            for action in [Action::Guide, Action::Shortcuts, Action::Palette] {
+                item(ui, true, None, action, cx);
+            }
+            ui.separator();
+            for action in [Action::News, Action::About] {
+                item(ui, true, None, action, cx);
+            }
         });
         if let Some(scene) = &state.scene {
             ui.separator();
@@ -167,7 +173,7 @@ pub(crate) fn top(ui: &mut Ui, cx: &mut Ctx<'_>, view: &Viewport) {
                 ui.label(RichText::new(format!("on {}", origin.host)).color(theme::weak()));
             }
         }
-        ui.with_layout(egui::Layout::right_to_left(Align::Center), |ui| {
+        ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
             let search = Button::new(RichText::new("Search actions").color(theme::weak()))
                 .shortcut_text(keys::label(ui.ctx(), &Action::Palette));
             if ui.add(search).on_hover_text(Action::Palette.tooltip()).clicked() {
@@ -203,9 +209,9 @@ fn entry(ui: &mut Ui, enabled: bool, on: Option<bool>, text: &str, action: Actio
     }
 }
 
-/// Draws the bar at the bottom.
-pub(crate) fn status(ui: &mut Ui, cx: &mut Ctx<'_>, picture: Option<&ViewPicture>) {
-    let state = cx.state;
+/// Draws the bar at the bottom; returns the click on its message.
+pub(crate) fn status(ui: &mut Ui, cx: &mut Ctx<'_>, picture: Option<&ViewPicture>) -> Option<ToastClick> {
+    let (state, mut clicked) = (cx.state, None);
     ui.horizontal(|ui| {
         match &state.job {
             Some(job) => {
@@ -220,6 +226,7 @@ pub(crate) fn status(ui: &mut Ui, cx: &mut Ctx<'_>, picture: Option<&ViewPicture
                     progress(ui, p, job);
                 }
             }
+            None if !state.toasts.is_empty() => {}
             None => {
                 ui.label(
                     RichText::new(if state.scene.is_some() { "Ready" } else { "Nothing open" }).color(theme::weak()),
@@ -229,7 +236,7 @@ pub(crate) fn status(ui: &mut Ui, cx: &mut Ctx<'_>, picture: Option<&ViewPicture
         if let Some(link) = &state.link {
             connection(ui, link);
         }
-        ui.with_layout(egui::Layout::right_to_left(Align::Center), |ui| {
+        ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
             let log = ui.selectable_label(cx.layout.shows(Pane::Log), "Log");
             if log.on_hover_text("Show or hide the log").clicked() {
                 cx.ask(Action::TogglePane(Pane::Log));
@@ -241,8 +248,11 @@ pub(crate) fn status(ui: &mut Ui, cx: &mut Ctx<'_>, picture: Option<&ViewPicture
                     None => ui.label(text.color(theme::weak())),
                 };
             }
+            let row = Layout::left_to_right(Align::Center);
+            clicked = ui.with_layout(row, |ui| toasts::show(ui, &state.toasts)).inner;
         });
     });
+    clicked
 }
 
 /// State of the connection to another computer.

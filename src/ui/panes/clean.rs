@@ -98,11 +98,13 @@ impl CleanPane {
     fn show_chosen(&mut self, ui: &mut Ui, measured: &MeasuredCloud, cx: &mut Ctx<'_>) {
         theme::section(ui, "Selected");
         let (count, all) = (self.chosen.as_ref().map_or(0, |c| c.count), measured.cloud.len());
-        let share = format::number(100.0 * count as f64 / all.max(1) as f64);
-        ui.label(format!("{} of {} Gaussians ({share} %)", format::count(count as u64), format::count(all as u64)));
+        let share = format::percent(count as f64 / all.max(1) as f64);
+        ui.label(format!("{} of {} Gaussians ({share})", format::count(count as u64), format::count(all as u64)));
         ui.horizontal(|ui| {
-            ui.radio_value(&mut self.choice.hide, false, "Mark").on_hover_text("Show them in magenta.");
-            ui.radio_value(&mut self.choice.hide, true, "Hide").on_hover_text("Show the scene without them.");
+            theme::outlined(ui, |ui| {
+                ui.radio_value(&mut self.choice.hide, false, "Mark").on_hover_text("Show them in magenta.");
+                ui.radio_value(&mut self.choice.hide, true, "Hide").on_hover_text("Show the scene without them.");
+            });
             let mut other = |ui: &mut Ui, text: &str, tip: &str, change: fn(&CloudMeasures, &[bool]) -> Vec<bool>| {
                 let button = ui.add_enabled(count > 0, Button::new(text)).on_hover_text(tip);
                 if let Some(chosen) = self.chosen.as_mut().filter(|_| button.clicked()) {

@@ -7,6 +7,7 @@ use super::super::state::LogLine;
 use super::super::theme;
 use super::super::viewport::Viewport;
 use super::PaneContents;
+use crate::math::format;
 
 /// The pane.
 pub(crate) struct LogPane;
@@ -17,7 +18,7 @@ impl PaneContents for LogPane {
         let state = cx.state;
         ui.horizontal(|ui| {
             ui.label(RichText::new("Log").strong());
-            ui.weak(format!("{} lines", state.log.len()));
+            ui.weak(format::things(state.log.len(), "line"));
             ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
                 if ui.small_button("Copy all").clicked() {
                     let lines: Vec<String> = state.log.iter().map(LogLine::dated).collect();

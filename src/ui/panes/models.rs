@@ -182,7 +182,7 @@ fn one(ui: &mut Ui, entry: &ModelEntry, model: &ModelState, cx: &mut Ctx<'_>) {
             let button = |text: &str| Button::new(text.to_owned()).small();
             if entry.is_hosted() {
                 let fetch = Action::FetchModel(entry.id.clone());
-                let text = format!("Download {} MB", entry.download_megabytes());
+                let text = format!("Download {}", crate::math::format::megabytes(entry.download_megabytes()));
                 if ui.add_enabled(idle, button(&text)).on_hover_text(fetch.tooltip()).clicked() {
                     cx.ask(fetch);
                 }

@@ -27,6 +27,9 @@ const THUMBNAIL_PX: f32 = 30.0;
 /// Width of the column of counts such as "123,456", points.
 const COUNT_PT: f32 = 48.0;
 
+/// Width of the button of a row's menu, points.
+const MENU_PT: f32 = 22.0;
+
 /// The list, and the name that is edited in it.
 #[derive(Default)]
 pub(crate) struct ObjectsPane {
@@ -191,11 +194,15 @@ impl Tree<'_> {
             let padding = ui.spacing().button_padding.x;
             self.facts.conflicts(ui, id, cx);
             ui.spacing_mut().button_padding.x = padding;
-            // In other rows the name uses that space.
-            if is_hovered || self.selected == Some(id) || *self.menu_of == Some(id) {
-                ui.spacing_mut().button_padding.x = 4.0;
-                self.menu(ui, id, cx);
-            }
+            // Other rows keep its room free, so that no name moves under the pointer.
+            let room = vec2(MENU_PT, ui.available_height());
+            ui.allocate_ui_with_layout(room, Layout::right_to_left(Align::Center), |ui| {
+                ui.set_min_width(MENU_PT);
+                if is_hovered || self.selected == Some(id) || *self.menu_of == Some(id) {
+                    ui.spacing_mut().button_padding.x = 4.0;
+                    self.menu(ui, id, cx);
+                }
+            });
             ui.with_layout(Layout::left_to_right(Align::Center), |ui| self.name(ui, id, cx));
         });
     }

@@ -8,7 +8,7 @@ use super::super::theme;
 use super::super::viewport::Viewport;
 use super::PaneContents;
 use crate::jobs::phrases::PhraseRow;
-use crate::math::format::{count, things};
+use crate::math::format::{count, percent, things};
 use crate::scene::text::elided;
 use crate::ui::actions::Action;
 
@@ -114,7 +114,7 @@ fn show_row(ui: &mut Ui, row: &PhraseRow, views: bool, cx: &mut Ctx<'_>) {
     ui.label(elided(answer, LETTERS)).on_hover_text(answer);
     ui.weak(if found { row.certainty } else { "" });
     ui.label(format!("{:.2}", row.score)).on_hover_text(format!("margin {:.2}", row.margin));
-    let share = format!("{:.2} % of the view", 100.0 * row.share);
+    let share = format!("{} of the view", percent(row.share));
     ui.label(format!("{} px", count(row.area_px as u64))).on_hover_text(share);
     ui.label(row.iou.map_or_else(String::new, |v| format!("{v:.3}")));
     if views {

@@ -1,11 +1,12 @@
 //! Dialog on photos without camera poses: runs COLMAP if it is installed, else shows its commands to copy.
 
-use egui::{Button, RichText, ScrollArea, vec2};
+use egui::{Button, Label, RichText, ScrollArea, vec2};
 
 use super::super::ctx::Ctx;
 use super::super::theme;
 use crate::io::unposed::Unposed;
 use crate::jobs::poses::{self, PoseTools};
+use crate::math::format;
 use crate::scene::text;
 use crate::ui::actions::Action;
 
@@ -13,7 +14,7 @@ use crate::ui::actions::Action;
 pub(crate) fn show(ctx: &egui::Context, photos: &Unposed, cx: &mut Ctx<'_>) -> bool {
     let response = theme::dialog("unposed").show(ctx, |ui| {
         ui.set_width(620.0_f32.min(ui.ctx().content_rect().width() - 80.0));
-        ui.heading(format!("{} photos, no camera poses", photos.photos.len()));
+        ui.heading(format!("{}, no camera poses", format::things(photos.photos.len(), "photo")));
         ui.weak(text::path(&photos.images));
         if !photos.beside.is_empty() {
             ui.label(text::lines(&photos.beside));
@@ -34,12 +35,13 @@ pub(crate) fn show(ctx: &egui::Context, photos: &Unposed, cx: &mut Ctx<'_>) -> b
         let commands = poses::commands(photos);
         let list = |ui: &mut egui::Ui| {
             ScrollArea::vertical().max_height(260.0).show(ui, |ui| {
-                for line in &commands {
-                    ui.horizontal(|ui| {
-                        if ui.add(Button::new("Copy").small()).on_hover_text(line).clicked() {
+                for (line, n) in commands.iter().zip(1..) {
+                    ui.horizontal_top(|ui| {
+                        let copy = ui.add(Button::new("Copy").small()).on_hover_text("Copy this command");
+                        if copy.accessible_name(format!("Copy command {n}")).clicked() {
                             ui.ctx().copy_text(line.clone());
                         }
-                        ui.add(egui::Label::new(RichText::new(line).monospace().small()).truncate());
+                        ui.add(Label::new(RichText::new(line).monospace()).wrap());
                     });
                 }
             });

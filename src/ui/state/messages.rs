@@ -82,10 +82,11 @@ impl AppState {
         }
     }
 
-    /// Shows a message that disappears by itself, and logs it.
+    /// Shows a message that disappears by itself, and logs it. It replaces earlier ones but warnings and errors.
     pub(crate) fn toast(&mut self, tone: Tone, text: impl Into<String>) {
         let text = text::lines(&text.into()).into_owned();
         self.say(tone, text.clone());
+        self.toasts.retain(|t| matches!(t.tone, Tone::Warning | Tone::Error) && t.text != text);
         self.toasts.push(Toast { id: self.next_toast, tone, text });
         self.next_toast += 1;
     }

@@ -165,7 +165,9 @@ impl Viewport {
     pub(crate) fn crop(&mut self, state: &AppState) {
         let in_use = matches!(self.tool, Some(Tool::Crop(_)));
         self.toggle(in_use, state, |view, scene| {
-            let crop = view.visibility.crop().unwrap_or_else(|| CropTool::first_box(&scene.home.bounds));
+            let crop = view.visibility.crop();
+            let crop =
+                crop.unwrap_or_else(|| CropTool::first_box(view.cloud.as_ref().map(|c| &***c), &scene.home.bounds));
             view.visibility.set_crop(Some(crop));
             Tool::Crop(CropTool)
         });

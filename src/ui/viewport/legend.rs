@@ -1,15 +1,18 @@
 //! Legend of the colors over the view, with threshold and opacity.
 
-use egui::{Color32, FontId, Mesh, Rect, RichText, Sense, Slider, Stroke, Ui, vec2};
+use egui::{Align, Color32, FontId, Label, Mesh, Rect, Response, RichText, Sense, Slider, Stroke, Ui, vec2};
 
 use super::query::{HATCH, INVENTED, OverlaySettings};
 use crate::math::colormap::Colormap;
+use crate::math::format;
 use crate::scene::NO_IDENTITY;
 use crate::ui::actions::Action;
 use crate::ui::color_by::ColorBy;
 use crate::ui::ctx::Ctx;
 use crate::ui::theme;
 
+/// Width of the labels of sliders, points.
+const LABEL_PT: f32 = 62.0;
 /// Steps of the color bar.
 const STEPS: usize = 32;
 
@@ -51,11 +54,20 @@ pub(super) fn show(
         }
         if settings.color_by == ColorBy::Heat {
             bar(ui, settings.colormap, ["0", "1"].map(String::from));
-            ui.add(Slider::new(&mut settings.threshold, 0.0..=1.0).fixed_decimals(2).text("threshold"))
+            slider(ui, "Threshold", &mut settings.threshold)
                 .on_hover_text("Outline pixels with at least this relevancy; 0 = off");
         }
-        ui.add(Slider::new(&mut settings.opacity, 0.0..=1.0).fixed_decimals(2).text("opacity"));
+        slider(ui, "Opacity", &mut settings.opacity);
     });
+}
+
+/// Draws a slider from 0 to 1 right of its label.
+fn slider(ui: &mut Ui, label: &str, value: &mut f32) -> Response {
+    let row = ui.horizontal(|ui| {
+        let id = ui.add_sized(vec2(LABEL_PT, 18.0), Label::new(RichText::new(label).small()).halign(Align::LEFT)).id;
+        ui.add(Slider::new(value, 0.0..=1.0).fixed_decimals(2)).labelled_by(id)
+    });
+    row.inner
 }
 
 /// Draws the share of unlabeled pixels, with a button to segment a photo.
@@ -65,8 +77,7 @@ fn show_unknown(ui: &mut Ui, share: Option<f64>, photo: Option<&str>, cx: &mut C
         hatch(ui, rect, HATCH, false);
         let text = match share {
             None => "Unknown".to_owned(),
-            Some(share) if share > 0.0 && share < 0.005 => "Under 1 % of this view is unknown".to_owned(),
-            Some(share) => format!("{:.0} % of this view is unknown", 100.0 * share),
+            Some(share) => format!("{} of this view is unknown", format::percent(share)),
         };
         let why = "No mask and no photo says whose it is. Without a color: masks say that it is nobody's.";
         ui.label(RichText::new(text).small()).on_hover_text(why);
@@ -89,10 +100,7 @@ fn show_invented(ui: &mut Ui, share: f64) {
     ui.horizontal(|ui| {
         let (rect, _) = ui.allocate_exact_size(vec2(18.0, 11.0), Sense::hover());
         hatch(ui, rect, [INVENTED, [110; 3]], true);
-        let text = match share {
-            share if share < 0.005 => "Under 1 % of this view is invented".to_owned(),
-            share => format!("{:.0} % of this view is invented", 100.0 * share),
-        };
+        let text = format!("{} of this view is invented", format::percent(share));
         let why = "Something was removed here that no photo shows the back of: painted from what is around.";
         ui.label(RichText::new(text).small()).on_hover_text(why);
     });

@@ -57,5 +57,6 @@ pub(crate) fn summary(known: &SemanticMap, map: &SemanticMap) -> String {
     let count = |is: &dyn Fn(usize) -> bool| (0..map.identity_of.len()).filter(|i| is(*i)).count();
     let taken = count(&|i| known.identity_of[i] == NO_IDENTITY && map.identity_of[i] != NO_IDENTITY);
     let unknown = count(&|i| map.is_unknown(i));
+    let [new, taken, unknown] = [new, taken, unknown].map(|n| crate::math::format::count(n as u64));
     format!("{new} new objects and parts; {taken} Gaussians were nobody's before, {unknown} are unknown")
 }

@@ -65,10 +65,8 @@ pub(super) fn show_offered(ui: &mut Ui, queries: &mut Queries, offered: &[String
     if offered.first().is_none_or(|first| *first == queries.side().typed) {
         return;
     }
-    ui.horizontal_wrapped(|ui| {
-        ui.label(RichText::new("Tab:").small().color(theme::weak()));
-        show_names(ui, queries, offered, semantics);
-    });
+    let label = RichText::new("Tab:").small().color(theme::weak());
+    theme::hanging(ui, label, |ui| show_names(ui, queries, offered, semantics));
 }
 
 /// Draws buttons that query these names.

@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use crate::math::format;
 use crate::navigate::Pose;
 use crate::scene::Mask;
 
@@ -92,7 +93,8 @@ impl TruthComparison {
         let Self { hits, misses, false_alarms, .. } = self;
         ui.horizontal_wrapped(|ui| {
             ui.strong(self.figure());
-            let texts = [format!("{hits} px hit"), format!("{misses} missed"), format!("{false_alarms} false alarms")];
+            let [hits, misses, alarms] = [*hits, *misses, *false_alarms].map(|n| format::count(n as u64));
+            let texts = [format!("{hits} px hit"), format!("{misses} missed"), format!("{alarms} false alarms")];
             for ([r, g, b], text) in COLORS.into_iter().zip(texts) {
                 ui.colored_label(egui::Color32::from_rgb(r, g, b), text);
             }

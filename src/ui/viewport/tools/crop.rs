@@ -9,7 +9,7 @@ use super::super::frusta::clipped;
 use super::super::split::ViewArea;
 use super::{CardPlaces, ToolScene, ViewTool};
 use crate::math::format;
-use crate::scene::{Bounds, Camera, CropBox};
+use crate::scene::{Bounds, Camera, CropBox, GaussianCloud};
 use crate::ui::actions::Action;
 use crate::ui::ctx::Ctx;
 use crate::ui::{keys, theme};
@@ -23,9 +23,11 @@ const STEPS: f64 = 500.0;
 pub(crate) struct CropTool;
 
 impl CropTool {
-    /// A box around the main content, with a margin: the scene's own box leaves out one in twenty.
-    pub(crate) fn first_box(content: &Bounds) -> CropBox {
-        let (center, half) = (content.center(), 0.8 * content.size());
+    /// A box around all Gaussians, with a margin: it crops nothing until it is changed.
+    pub(crate) fn first_box(cloud: Option<&GaussianCloud>, content: &Bounds) -> CropBox {
+        let all = cloud.and_then(|cloud| Bounds::of((0..cloud.len()).map(|i| cloud.world_position(i))));
+        let all = all.unwrap_or(*content);
+        let (center, half) = (all.center(), 0.51 * all.size());
         CropBox { bounds: Bounds { min: center - half, max: center + half }, outside: false }
     }
 }
@@ -183,6 +185,24 @@ pub(super) fn travel(drag: Vec2, along: Vec2) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn the_first_box_is_around_every_gaussian() {
+        let mut positions: Vec<[f32; 3]> = (0..100).map(|i| [i as f32 * 0.01; 3]).collect();
+        positions.extend([[9.0, -9.0, 0.0], [f32::NAN; 3]]);
+        let cloud = GaussianCloud { positions, ..GaussianCloud::default() };
+        let content = Bounds::robust((0..cloud.len()).map(|i| cloud.world_position(i))).expect("some");
+        let is_in = |b: &Bounds, i| {
+            let p: DVec3 = cloud.world_position(i);
+            p.cmpge(b.min).all() && p.cmple(b.max).all()
+        };
+        let first = CropTool::first_box(Some(&cloud), &content).bounds;
+        assert!((0..101).all(|i| is_in(&first, i)), "{first:?}");
+        // Control: the box of the content leaves the stray one out; without Gaussians it is all that is known.
+        assert!(!is_in(&content, 100));
+        let without = CropTool::first_box(None, &content).bounds;
+        assert!(!is_in(&without, 100) && is_in(&without, 50));
+    }
 
     #[test]
     fn a_face_follows_the_cursor_along_its_axis() {
