@@ -18,6 +18,7 @@ pub enum FileKind {
     Videos,
     Paths,
     Models,
+    Measurements,
     Reports,
     Conversations,
 }

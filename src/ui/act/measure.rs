@@ -4,7 +4,8 @@ use super::{export, remote};
 use crate::jobs::measurements;
 use crate::pipeline::observer::Observer;
 use crate::ui::app::App;
-use crate::ui::file_dialogs::FileRequest;
+use crate::ui::file_dialogs::{FileFormat, FileRequest};
+use crate::ui::file_kind::FileKind;
 use crate::ui::state::Tone;
 use crate::ui::stored_measurements::StoredMeasurements;
 use crate::worker::JobInfo;
@@ -63,7 +64,9 @@ pub(in crate::ui) fn write(app: &mut App) {
     if app.viewport.measurements.is_empty() {
         return app.state.toast(Tone::Info, "There are no measurements to export yet: measure something first (M).");
     }
-    let request = FileRequest::save("Export measurements", format!("{}-measurements.csv", export::scene_name(app)));
+    let formats = vec![FileFormat::new("Table (.csv)", &[".csv"]), FileFormat::new("JSON (.json)", &[".json"])];
+    let stem = format!("{}-measurements", export::scene_name(app));
+    let request = FileRequest::save(FileKind::Measurements, "Export measurements", &stem, formats);
     app.choose(request, |app, path| {
         let all = app.viewport.measurements.clone();
         let meters = app.state.scene.as_ref().and_then(|scene| scene.meters_per_unit());

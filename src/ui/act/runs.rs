@@ -13,6 +13,7 @@ use crate::ui::actions::Action;
 use crate::ui::app::App;
 use crate::ui::dialogs::{DialogAnswer, Question};
 use crate::ui::file_dialogs::FileRequest;
+use crate::ui::file_kind::FileKind;
 use crate::ui::state::Tone;
 use crate::worker::{Failure, JobInfo, Stop};
 
@@ -106,7 +107,7 @@ pub(in crate::ui) fn save_copy(app: &mut App) {
         let text = "Nothing to copy yet: a scene is copied once it is trained. Export Gaussians writes a splat file.";
         return app.state.toast(Tone::Warning, text);
     }
-    app.choose(FileRequest::folder("Choose an empty folder for the copy"), move |app, to| {
+    app.choose(FileRequest::new_folder(FileKind::Scenes, "Empty folder for the copy"), move |app, to| {
         let info = JobInfo::long(format!("Copying the scene to {}", file_name(&to))).pausable();
         let copy =
             move |observer: &mut dyn Observer| -> Result<PathBuf, JobError> { save_copy::run(&from, &to, observer) };
