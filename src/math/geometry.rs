@@ -107,12 +107,16 @@ fn around(corners: &[DVec2]) -> impl Iterator<Item = [DVec2; 2]> + Clone + '_ {
 fn crosses_itself(corners: &[DVec2]) -> bool {
     let n = corners.len();
     let edges: Vec<[DVec2; 2]> = around(corners).collect();
-    let side = |[a, b]: [DVec2; 2], p: DVec2| (b - a).perp_dot(p - a);
+    // Twice the area of a triangle; 0 for a point on the edge, whatever rounding has left.
+    let side = |[a, b]: [DVec2; 2], p: DVec2| {
+        let area = (b - a).perp_dot(p - a);
+        if area.abs() < NOTHING { 0.0 } else { area }
+    };
     let meet = |e: [DVec2; 2], f: [DVec2; 2]| {
         let (c, d) = (side(e, f[0]), side(e, f[1]));
         let (a, b) = (side(f, e[0]), side(f, e[1]));
         // On one line, edges meet where their intervals do.
-        if [a, b, c, d].iter().all(|s| s.abs() < NOTHING) {
+        if [a, b, c, d] == [0.0; 4] {
             let along = e[1] - e[0];
             let (low, high) = (f[0].dot(along).min(f[1].dot(along)), f[0].dot(along).max(f[1].dot(along)));
             return low <= e[1].dot(along) && high >= e[0].dot(along);

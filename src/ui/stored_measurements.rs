@@ -10,7 +10,7 @@ pub(super) struct StoredMeasurements {
     /// Number and folder of their scene.
     pub(super) of: (u64, PathBuf),
     pub(super) stored: Vec<Measurement>,
-    /// Those that were tried last, and whether the folder held a result then.
+    /// Measurements that were tried last, and whether the folder held a result then.
     pub(super) tried: Option<(Vec<Measurement>, bool)>,
     /// True if they are being stored.
     pub(super) is_storing: bool,
