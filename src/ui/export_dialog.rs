@@ -23,9 +23,9 @@ const LOSS_PT: f32 = 90.0;
 pub(super) enum ExportScope {
     All,
     Identity(IdentityId),
-    /// Those that the tool selects.
+    /// Gaussians that the tool selects.
     Selection,
-    /// Those that the crop box keeps.
+    /// Gaussians that the crop box keeps.
     Crop,
 }
 
@@ -127,7 +127,7 @@ impl ExportDialog {
         response.inner.or_else(|| response.should_close().then_some(ExportDecision::Close))
     }
 
-    /// What is exported, if there is a choice.
+    /// Draws the scopes, if there is a choice.
     fn scopes(&self, ui: &mut Ui) -> Option<ExportDecision> {
         let n = format!("{} Gaussians", format::count(self.cloud.len() as u64));
         let mut changed = None;

@@ -12,7 +12,7 @@ use super::listing::{self, FolderEntry, FolderListing, expanded};
 use super::place::{PlaceAct, PlaceRow};
 use super::request::{FileRequest, PathPurpose};
 use super::rows::{RowAct, RowList};
-use super::verdict::{Verdict, judge};
+use super::verdict::{NameVerdict, judge};
 use crate::scene::text;
 use crate::ui::dialogs::show_question;
 use crate::ui::text_field::select_start;
@@ -25,7 +25,7 @@ const PAGE: usize = 10;
 /// selection.
 const FOCUS_FRAMES: u8 = 3;
 
-/// What is in the way of the choice.
+/// Obstacle to the choice.
 enum Obstacle {
     Text(String),
     /// A folder that would have to be made.
@@ -340,7 +340,7 @@ impl OwnDialog {
         enters
     }
 
-    /// What is in the way, and the offer to make a missing folder; returns true once the name has one.
+    /// Shows the obstacle, and offers to make a missing folder; returns true once the name has one.
     fn obstacle_row(&mut self, ui: &mut Ui) -> bool {
         let mut made = None;
         ui.horizontal_wrapped(|ui| {
@@ -375,14 +375,14 @@ impl OwnDialog {
             Some(entry) if entry.is_folder && !(self.request.saves() && by_button) => self.enter(entry.path.clone()),
             Some(entry) if !entry.is_folder && !self.request.saves() => return Some(entry.path.clone()),
             _ => match judge(&self.request, &self.folder, &self.name, self.format) {
-                Verdict::Chosen(path) => return Some(path),
-                Verdict::Replaces(path) => self.replaces = Some(path),
-                Verdict::Enter(folder) => {
+                NameVerdict::Chosen(path) => return Some(path),
+                NameVerdict::Replaces(path) => self.replaces = Some(path),
+                NameVerdict::Enter(folder) => {
                     self.name = self.request.clone().with_format(self.format).proposed();
                     self.enter(folder);
                 }
-                Verdict::Missing(folder) => self.obstacle = Some(Obstacle::Missing { folder, for_name: true }),
-                Verdict::Refused(text) => self.obstacle = Some(Obstacle::Text(text)),
+                NameVerdict::Missing(folder) => self.obstacle = Some(Obstacle::Missing { folder, for_name: true }),
+                NameVerdict::Refused(text) => self.obstacle = Some(Obstacle::Text(text)),
             },
         }
         None

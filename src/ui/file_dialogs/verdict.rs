@@ -8,7 +8,7 @@ use crate::scene::text;
 
 /// Consequence of a name.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(super) enum Verdict {
+pub(super) enum NameVerdict {
     Chosen(PathBuf),
     /// An existing file that would be replaced.
     Replaces(PathBuf),
@@ -21,51 +21,53 @@ pub(super) enum Verdict {
 }
 
 /// Judges a name that was typed while `folder` was shown.
-pub(super) fn judge(request: &FileRequest, folder: &Path, name: &str, format: usize) -> Verdict {
+pub(super) fn judge(request: &FileRequest, folder: &Path, name: &str, format: usize) -> NameVerdict {
     let name = name.trim();
     if name.is_empty() {
         return match request.purpose {
-            PathPurpose::Folder { .. } => Verdict::Chosen(folder.into()),
-            _ => Verdict::Refused("Type a name, or choose a file.".into()),
+            PathPurpose::Folder { .. } => NameVerdict::Chosen(folder.into()),
+            _ => NameVerdict::Refused("Type a name, or choose a file.".into()),
         };
     }
     let typed = folder.join(expanded(name));
     match request.purpose {
         PathPurpose::Save(_) => judge_new(request, typed, name.ends_with(std::path::is_separator), format),
-        _ if typed.is_dir() => Verdict::Enter(typed),
-        PathPurpose::Open if typed.exists() => Verdict::Chosen(typed),
+        _ if typed.is_dir() => NameVerdict::Enter(typed),
+        PathPurpose::Open if typed.exists() => NameVerdict::Chosen(typed),
         PathPurpose::Folder { .. } if typed.exists() => {
-            Verdict::Refused(format!("\u{201c}{}\u{201d} is a file. Choose a folder.", text::line(name)))
+            NameVerdict::Refused(format!("\u{201c}{}\u{201d} is a file. Choose a folder.", text::line(name)))
         }
-        PathPurpose::Folder { creates: true } => Verdict::Missing(typed),
-        _ => Verdict::Refused(format!("There is no \u{201c}{}\u{201d} here.", text::line(name))),
+        PathPurpose::Folder { creates: true } => NameVerdict::Missing(typed),
+        _ => NameVerdict::Refused(format!("There is no \u{201c}{}\u{201d} here.", text::line(name))),
     }
 }
 
 /// Judges the path of a file to write.
-fn judge_new(request: &FileRequest, typed: PathBuf, is_folder: bool, format: usize) -> Verdict {
+fn judge_new(request: &FileRequest, typed: PathBuf, is_folder: bool, format: usize) -> NameVerdict {
     let makes_folder = request.formats.get(format).is_some_and(|f| f.is_folder());
-    let Some(name) = typed.file_name().map(|n| n.to_string_lossy().into_owned()) else { return Verdict::Enter(typed) };
+    let Some(name) = typed.file_name().map(|n| n.to_string_lossy().into_owned()) else {
+        return NameVerdict::Enter(typed);
+    };
     if typed.is_dir() && (is_folder || !makes_folder) {
-        return Verdict::Enter(typed);
+        return NameVerdict::Enter(typed);
     }
     if is_folder {
-        return Verdict::Missing(typed);
+        return NameVerdict::Missing(typed);
     }
     let path = typed.with_file_name(request.completed(&name, format));
     let parent = path.parent().unwrap_or(Path::new("/"));
     if !parent.exists() {
-        return Verdict::Missing(parent.into());
+        return NameVerdict::Missing(parent.into());
     }
     if !parent.is_dir() {
-        return Verdict::Refused(format!("{} is a file. Choose a folder.", text::path(parent)));
+        return NameVerdict::Refused(format!("{} is a file. Choose a folder.", text::path(parent)));
     }
     if path.is_dir() && !makes_folder {
-        return Verdict::Refused(format!("{} is a folder. Choose another name.", text::path(&path)));
+        return NameVerdict::Refused(format!("{} is a folder. Choose another name.", text::path(&path)));
     }
     match path.symlink_metadata() {
-        Ok(_) => Verdict::Replaces(path),
-        Err(_) => Verdict::Chosen(path),
+        Ok(_) => NameVerdict::Replaces(path),
+        Err(_) => NameVerdict::Chosen(path),
     }
 }
 
@@ -84,26 +86,26 @@ mod tests {
         let formats = vec![FileFormat::new("PLY", &[".ply"]), FileFormat::new("Frames", &[""])];
         let save = FileRequest::save(FileKind::Gaussians, "Export", "a", formats.clone());
         let of = |request: &FileRequest, name: &str, format| judge(request, folder.path(), name, format);
-        assert_eq!(of(&save, "b", 0), Verdict::Chosen(at("b.ply")));
-        assert_eq!(of(&save, "a", 0), Verdict::Replaces(at("a.ply")));
-        assert_eq!(of(&save, "sub", 0), Verdict::Enter(at("sub")));
-        assert_eq!(of(&save, "sub", 1), Verdict::Replaces(at("sub")), "frames go into it");
-        assert_eq!(of(&save, "sub/b.ply", 0), Verdict::Chosen(at("sub/b.ply")));
-        assert_eq!(of(&save, "new/er/b", 0), Verdict::Missing(at("new/er")));
-        assert_eq!(of(&save, "new/", 0), Verdict::Missing(at("new/")));
+        assert_eq!(of(&save, "b", 0), NameVerdict::Chosen(at("b.ply")));
+        assert_eq!(of(&save, "a", 0), NameVerdict::Replaces(at("a.ply")));
+        assert_eq!(of(&save, "sub", 0), NameVerdict::Enter(at("sub")));
+        assert_eq!(of(&save, "sub", 1), NameVerdict::Replaces(at("sub")), "frames go into it");
+        assert_eq!(of(&save, "sub/b.ply", 0), NameVerdict::Chosen(at("sub/b.ply")));
+        assert_eq!(of(&save, "new/er/b", 0), NameVerdict::Missing(at("new/er")));
+        assert_eq!(of(&save, "new/", 0), NameVerdict::Missing(at("new/")));
         assert!(!at("new").exists(), "nothing is made silently");
         for name in ["", "a.ply/b"] {
-            assert!(matches!(of(&save, name, 0), Verdict::Refused(_)), "{name}");
+            assert!(matches!(of(&save, name, 0), NameVerdict::Refused(_)), "{name}");
         }
         let open = FileRequest::file(FileKind::Scenes, "Open", formats);
-        assert_eq!(of(&open, "a.ply", 0), Verdict::Chosen(at("a.ply")));
-        assert!(matches!(of(&open, "b.ply", 0), Verdict::Refused(_)));
+        assert_eq!(of(&open, "a.ply", 0), NameVerdict::Chosen(at("a.ply")));
+        assert!(matches!(of(&open, "b.ply", 0), NameVerdict::Refused(_)));
         let [old, new] = [FileRequest::folder, FileRequest::new_folder].map(|of| of(FileKind::Masks, "Masks"));
-        assert_eq!(of(&old, "", 0), Verdict::Chosen(folder.path().into()));
-        assert_eq!(of(&old, "sub", 0), Verdict::Enter(at("sub")));
-        assert_eq!(of(&new, "b", 0), Verdict::Missing(at("b")));
+        assert_eq!(of(&old, "", 0), NameVerdict::Chosen(folder.path().into()));
+        assert_eq!(of(&old, "sub", 0), NameVerdict::Enter(at("sub")));
+        assert_eq!(of(&new, "b", 0), NameVerdict::Missing(at("b")));
         for (request, name) in [(&old, "b"), (&old, "a.ply"), (&new, "a.ply")] {
-            assert!(matches!(of(request, name, 0), Verdict::Refused(_)), "{name}");
+            assert!(matches!(of(request, name, 0), NameVerdict::Refused(_)), "{name}");
         }
     }
 }

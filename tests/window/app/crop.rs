@@ -70,6 +70,7 @@ fn a_crop_box_is_drawn_inverted_undone_and_exported() {
 
     w.harness.state_mut().layout.folder = Some(folder.path().to_path_buf());
     w.click("Export\u{2026}");
+    w.harness.run_steps(3);
     w.click("Save\u{2026}");
     w.until("a dialog", |a| a.chooses_file());
     w.click("Save");

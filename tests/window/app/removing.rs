@@ -20,6 +20,11 @@ fn a_scene_without_a_box_is_seen_beside_and_opened() {
     assert!(made.join("scene.json").is_file());
 
     // Another fill is another scene; none replaces one that is there.
+    // The card stays within its half of the window: what has no room is in its menu.
+    let view = w.harness.get_by_label("without box 1").rect();
+    assert!(view.left() >= 0.0 && w.harness.get_by_role_and_label(Role::Button, "Options").rect().right() < 1200.0);
+    w.click("Options");
+    w.harness.run_steps(3);
     w.click("Another fill");
     let again = folder.path().join("scene-without-box-1-2");
     w.until("another one", |_| again.join("scene.json").is_file());
