@@ -24,7 +24,7 @@ use crate::ui::actions::Action;
 use crate::worker::{JobInfo, Stop, Task, Tasks};
 
 /// Height of a row, and size of its picture, points.
-const ROW_PT: f32 = 58.0;
+const ROW_PT: f32 = 62.0;
 const PICTURE_PT: [f32; 2] = [62.0, 46.0];
 /// Height of the list, points: the last row that is cut off says that there are more.
 const LIST_PT: f32 = 3.6 * ROW_PT;
@@ -140,8 +140,9 @@ impl RunsList {
         let weak =
             |text: String| Label::new(RichText::new(text).small().color(theme::weak())).selectable(false).truncate();
         let is_training = is_open && cx.state.is_training();
-        ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
+        let first = |ui: &mut Ui| {
             ui.spacing_mut().item_spacing.x = 4.0;
+            ui.spacing_mut().button_padding = vec2(6.0, 1.0);
             let menu = ui.menu_button("\u{2026}", |ui| self.menu(ui, run, is_open, is_training, cx));
             menu.response.on_hover_text(format!("Actions on {}", run.name));
             if self.renaming.as_ref().is_some_and(|renaming| renaming.run == run.folder) {
@@ -159,7 +160,8 @@ impl RunsList {
                 let name = RichText::new(&run.name).strong().color(theme::text());
                 ui.add(Label::new(name).selectable(false).truncate());
             });
-        });
+        };
+        ui.horizontal(|ui| ui.with_layout(Layout::right_to_left(Align::Center), first));
         let [quality, objects] = run.lines();
         ui.add(weak(quality));
         ui.add(weak(objects));
