@@ -1,4 +1,4 @@
-//! What a person sees of rows, tabs, messages, help and the offers of the chat.
+//! Appearance of rows, tabs, messages and help, and the offers of the chat.
 
 use egui::Key;
 use egui::accesskit::Role;
