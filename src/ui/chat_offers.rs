@@ -1,4 +1,4 @@
-//! What the program can do but the chat does not do itself: sentences that ask for it, and the actions that do it.
+//! Offers of the chat: sentences that ask for what it does not do itself, and the actions that do it.
 
 use crate::pipeline::semantics::lifting::edit::Edit;
 use crate::scene::colors;
@@ -63,10 +63,7 @@ const OFFERS: &[(&[&str], Offered)] = &[
     ),
     (&["other|own|my|load|use|open|choose mask", "load|import|use label"], These(|| vec![Action::ChooseMasks])),
     (&["web page|site|viewer", "webpage", "website", "html"], These(|| vec![Action::ExportPage])),
-    (
-        &["export|save|write|download all|everything|every object|thing|part"],
-        These(|| vec![Action::ExportAll, Action::ExportPly]),
-    ),
+    (&["export|save|write|download all|everything|every"], These(|| vec![Action::ExportAll, Action::ExportPly])),
     (
         &["export|download|write {}", "save {} as|to|in|into", "give|get|need|want {} as ply|spz|sog|glb|splat|file"],
         OnThing(Action::ExportTarget),
@@ -108,7 +105,7 @@ const OFFERS: &[(&[&str], Offered)] = &[
         These(|| vec![Action::ToggleCompare, Action::Show(ViewMode::Difference)]),
     ),
     (&["side by side", "split view|screen", "two view"], These(|| vec![Action::ToggleSplit])),
-    (&["measure", "ruler", "tape", "set|change scale|unit"], These(|| vec![Action::Measure])),
+    (&["measure", "ruler", "tape", "set|change scale|unit", "scale meter|metre|unit"], These(|| vec![Action::Measure])),
     (
         &["depth map|view|image|picture", "show|see|display|color|draw depth"],
         These(|| vec![Action::Show(ViewMode::Depth)]),
@@ -125,7 +122,7 @@ const OFFERS: &[(&[&str], Offered)] = &[
             "rotate|turn|spin|tilt|flip {}",
             "scale|resize|enlarge|shrink|stretch|duplicate|clone|copy {}",
             "put|place|set {} on|onto|next|beside|under|left|right|behind|in|into|up|down|by",
-            "make {} bigger|larger|smaller|taller|shorter|wider",
+            "make {} bigger|larger|smaller|taller|shorter|wider|twice|half",
             "copy of {}",
         ],
         OnThing(Action::Transform),

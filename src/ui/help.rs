@@ -75,7 +75,7 @@ fn blocks(text: &str) -> Vec<HelpBlock> {
             (is_code, goes_on) = (!is_code, false);
         } else if is_code {
             all.push(HelpBlock::Verbatim(line.to_owned()));
-        } else if plain.is_empty() {
+        } else if plain.is_empty() || plain.starts_with("![") {
             goes_on = false;
         } else if plain.starts_with('#') {
             all.push(HelpBlock::Heading(plain.trim_start_matches('#').trim().to_owned()));

@@ -20,7 +20,7 @@ pub(crate) enum ToastClick {
     OpenLog,
 }
 
-/// When each message was first seen.
+/// Time at which each message was first seen.
 #[derive(Default)]
 pub(crate) struct Toasts {
     since: HashMap<u64, f64>,

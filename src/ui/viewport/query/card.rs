@@ -216,10 +216,11 @@ fn show_nothing(ui: &mut Ui, queries: &mut Queries, newest: &Asked, semantics: &
         .offers(NAMED)
         .map(|ids| ids.into_iter().map(|id| semantics.identities.full_name(id)).collect::<Vec<_>>());
     let named: Vec<String> = newest.reading.near.iter().map(|(_, other)| other.clone()).chain(by_name).collect();
-    ui.horizontal_wrapped(|ui| match (named.is_empty(), by_looks.is_empty()) {
+    let weak = |text: String| RichText::new(text).color(theme::weak());
+    match (named.is_empty(), by_looks.is_empty()) {
         (false, _) => {
-            ui.weak("Did you mean");
-            show_names(ui, queries, &named[..named.len().min(NAMED)], semantics);
+            let named = &named[..named.len().min(NAMED)];
+            theme::hanging(ui, weak("Did you mean".into()), |ui| show_names(ui, queries, named, semantics));
         }
         (true, false) => {}
         (true, true) => {
@@ -227,17 +228,16 @@ fn show_nothing(ui: &mut Ui, queries: &mut Queries, newest: &Asked, semantics: &
             if known.is_empty() {
                 ui.weak("Nothing here has a name yet; Details lists what comes nearest.");
             } else {
-                ui.weak(format!("{}, e.g.", format::things(known.len(), "name")));
+                let label = format!("{}, e.g.", format::things(known.len(), "name"));
+                known.truncate(NAMED);
+                theme::hanging(ui, weak(label), |ui| show_names(ui, queries, &known, semantics));
             }
-            known.truncate(NAMED);
-            show_names(ui, queries, &known, semantics);
         }
-    });
+    }
     if !by_looks.is_empty() {
-        ui.horizontal_wrapped(|ui| {
-            ui.weak("Looks most like").on_hover_text("By embedding: no name says so");
-            show_names(ui, queries, &by_looks, semantics);
-        });
+        // By embedding: no name says so.
+        let label = weak("Looks most like".into());
+        theme::hanging(ui, label, |ui| show_names(ui, queries, &by_looks, semantics));
     }
 }
 
