@@ -22,6 +22,12 @@ use crate::worker::view::ViewPicture;
 /// Indent of entries in a menu with switches.
 const INDENT: &str = "     ";
 
+/// Least room for a job's progress beside a message, points.
+const CROWDED_PT: f32 = 800.0;
+
+/// Least room for the name of the device that draws, points.
+const DRAWN_BY_PT: f32 = 130.0;
+
 /// Width of the pause and resume button, points.
 const PAUSE_PT: f32 = 62.0;
 
@@ -222,7 +228,10 @@ pub(crate) fn status(ui: &mut Ui, cx: &mut Ctx<'_>, picture: Option<&ViewPicture
                     job_buttons(ui, job, cx);
                 }
                 ui.label(RichText::new(job.text()).strong());
-                if let Some(p) = job.progress.as_ref().filter(|_| state.scene.is_some() && !job.canceling) {
+                // A message goes first where there is no room for both.
+                let has_room = state.toasts.is_empty() || ui.available_width() > CROWDED_PT;
+                let shown = has_room && state.scene.is_some() && !job.canceling;
+                if let Some(p) = job.progress.as_ref().filter(|_| shown) {
                     progress(ui, p, job);
                 }
             }
@@ -241,7 +250,7 @@ pub(crate) fn status(ui: &mut Ui, cx: &mut Ctx<'_>, picture: Option<&ViewPicture
             if log.on_hover_text("Show or hide the log").clicked() {
                 cx.ask(Action::TogglePane(Pane::Log));
             }
-            if let Some(p) = picture {
+            if let Some(p) = picture.filter(|_| ui.available_width() > DRAWN_BY_PT) {
                 let text = RichText::new(format!("Rendered on {}", p.drawn_by)).small();
                 match &p.instead_of_gpu {
                     Some(why) => ui.label(text.color(theme::warning())).on_hover_text(why),

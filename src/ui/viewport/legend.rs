@@ -1,6 +1,6 @@
 //! Legend of the colors over the view, with threshold and opacity.
 
-use egui::{Align, Color32, FontId, Label, Mesh, Rect, Response, RichText, Sense, Slider, Stroke, Ui, vec2};
+use egui::{Align, Color32, FontId, Layout, Mesh, Rect, Response, RichText, Sense, Slider, Stroke, Ui, vec2};
 
 use super::query::{HATCH, INVENTED, OverlaySettings};
 use crate::math::colormap::Colormap;
@@ -64,7 +64,13 @@ pub(super) fn show(
 /// Draws a slider from 0 to 1 right of its label.
 fn slider(ui: &mut Ui, label: &str, value: &mut f32) -> Response {
     let row = ui.horizontal(|ui| {
-        let id = ui.add_sized(vec2(LABEL_PT, 18.0), Label::new(RichText::new(label).small()).halign(Align::LEFT)).id;
+        // Sliders stand below each other.
+        let room = vec2(LABEL_PT, ui.available_height());
+        let label = ui.allocate_ui_with_layout(room, Layout::left_to_right(Align::Center), |ui| {
+            ui.set_min_width(LABEL_PT);
+            ui.label(RichText::new(label).small())
+        });
+        let id = label.inner.id;
         ui.add(Slider::new(value, 0.0..=1.0).fixed_decimals(2)).labelled_by(id)
     });
     row.inner
