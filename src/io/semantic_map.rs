@@ -102,7 +102,9 @@ pub(crate) fn identities(folder: &Path) -> Identities {
     let read = || {
         let length = files::read_start(&path, LENGTH)?;
         let length = length.first_chunk().map_or(0, |bytes| u64::from_le_bytes(*bytes));
-        header(&path, &files::read_start(&path, length.saturating_add(LENGTH).min(MAX_BYTES))?)
+        let head = files::read_start(&path, length.saturating_add(LENGTH).min(MAX_BYTES))?;
+        let tensors: serde_json::Value = files::json(head.get(LENGTH as usize..).unwrap_or_default(), &path)?;
+        parsed(&path, tensors["__metadata__"][KEY].as_str())
     };
     read().map_or_else(|_| Identities::default(), |header| header.identities)
 }
@@ -201,7 +203,12 @@ fn features(path: &Path, bytes: &[u8], encoder: String, identities: &Identities)
 fn header(path: &Path, bytes: &[u8]) -> Result<Header, IoError> {
     let broken = |reason: String| IoError::Syntax { path: path.into(), place: "header".into(), reason };
     let (_, metadata) = SafeTensors::read_metadata(bytes).map_err(|e| broken(e.to_string()))?;
-    let text = metadata.metadata().as_ref().and_then(|m| m.get(KEY));
+    parsed(path, metadata.metadata().as_ref().and_then(|m| m.get(KEY)).map(String::as_str))
+}
+
+/// Parses the header's text.
+fn parsed(path: &Path, text: Option<&str>) -> Result<Header, IoError> {
+    let broken = |reason: String| IoError::Syntax { path: path.into(), place: "header".into(), reason };
     let text = text.ok_or_else(|| broken(format!("no metadata '{KEY}': not a semantic map")))?;
     let value: serde_json::Value = serde_json::from_str(text).map_err(|e| broken(e.to_string()))?;
     let version = value["version"].as_u64().unwrap_or(0);

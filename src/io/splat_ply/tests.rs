@@ -94,7 +94,7 @@ fn gaussians_that_are_not_finite_are_left_out_and_named() {
     c.log_scales[7][2] = f32::INFINITY;
     let left = parsed(&bytes(&c)).expect("others are finite");
     let told = left.warnings.concat();
-    assert!(told.contains("2 of 3000 Gaussians") && told.contains("first: Gaussian 7, scale"), "{told}");
+    assert!(told.contains("2 of 3,000 Gaussians") && told.contains("first: Gaussian 7, scale"), "{told}");
     let kept: Vec<usize> = (0..3000).filter(|i| ![7, 2100].contains(i)).collect();
     assert!(GaussianCloud { warnings: Vec::new(), ..left } == good.select(&kept));
     let folder = tempfile::tempdir().expect("folder");

@@ -1,11 +1,26 @@
-//! Files beside a splat of 3D Gaussian Splatting: cameras to view it from, and the photos if they still exist.
+//! Files beside a scene: those of the program, and those of 3D Gaussian Splatting with cameras to view it from and the
+//! photos if they still exist.
 
 use std::path::{Path, PathBuf};
 
-use super::Scene;
+use super::{OpenedScene, Scene};
 use crate::io::gs_output::{self, GsOutput};
+use crate::io::scene_files::{SELECTION_FILE, is_scene};
 use crate::io::trained::SceneCamera;
 use crate::scene::{Dataset, Photo};
+
+impl OpenedScene {
+    /// Returns whether it has a folder of its own, in which all of it is stored.
+    pub(crate) fn is_stored(&self) -> bool {
+        is_scene(&self.out)
+    }
+
+    /// Returns the file that keeps its preparation for selecting by clicks.
+    pub(crate) fn selection_file(&self) -> PathBuf {
+        let folder = if self.is_stored() { &self.out } else { &self.report_out };
+        folder.join(SELECTION_FILE)
+    }
+}
 
 /// Returns the splat of a folder that 3D Gaussian Splatting wrote, else the path itself.
 pub(super) fn splat_of(path: &Path) -> PathBuf {

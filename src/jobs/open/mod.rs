@@ -9,7 +9,7 @@ use super::runs::{self, RunSummary};
 use super::sparse_cloud::sparse_cloud;
 use super::{Folders, JobError, measurements, plan};
 use crate::io::labels::Labels;
-use crate::io::scene_files::{CHECKPOINT_FILE, SELECTION_FILE};
+use crate::io::scene_files::CHECKPOINT_FILE;
 use crate::io::trained::{self, History, SceneCamera};
 use crate::io::{self, Opened, TrainedScene};
 use crate::pipeline::observer::{Observer, Severity};
@@ -252,13 +252,7 @@ impl OpenedScene {
 
     /// Returns the path of its Gaussians: the folder of a trained scene, or a file.
     pub(crate) fn stored(&self) -> &Path {
-        if trained::is_scene(&self.out) { &self.out } else { &self.path }
-    }
-
-    /// Returns the file that keeps its preparation for selecting by clicks.
-    pub(crate) fn selection_file(&self) -> PathBuf {
-        let folder = if trained::is_scene(&self.out) { &self.out } else { &self.report_out };
-        folder.join(SELECTION_FILE)
+        if self.is_stored() { &self.out } else { &self.path }
     }
 
     /// Returns the scene after training into `out`: other settings are another training run, in its own folder. A scene

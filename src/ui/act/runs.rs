@@ -6,7 +6,6 @@ use std::sync::Arc;
 use super::export::is_saved;
 use super::open::file_name;
 use super::remote;
-use crate::io::scene_files::is_scene;
 use crate::jobs::{JobError, runs, save_copy, show_folder};
 use crate::pipeline::observer::Observer;
 use crate::ui::actions::Action;
@@ -97,13 +96,13 @@ pub(in crate::ui) fn show_folder(app: &mut App, ctx: &egui::Context, of: Option<
 
 /// Copies the scene's folder to another place.
 pub(in crate::ui) fn save_copy(app: &mut App) {
-    let Some(from) = app.state.scene.as_ref().map(|s| s.out.clone()) else {
+    let Some((from, is_stored)) = app.state.scene.as_ref().map(|s| (s.out.clone(), s.is_stored())) else {
         return app.state.toast(Tone::Warning, "Nothing to copy yet: open a scene first.");
     };
     if remote::refuses(app, "Copying the scene", "copy its folder there") {
         return;
     }
-    if app.state.is_training() || !is_scene(&from) {
+    if app.state.is_training() || !is_stored {
         let text = "Nothing to copy yet: a scene is copied once it is trained. Export Gaussians writes a splat file.";
         return app.state.toast(Tone::Warning, text);
     }

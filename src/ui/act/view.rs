@@ -11,7 +11,6 @@ use crate::jobs::JobError;
 use crate::jobs::go_to::{self, ApproachRequest, Approached};
 use crate::navigate::FRAMES;
 use crate::navigate::target::{Side, ViewPreference};
-use crate::navigate::turntable;
 use crate::pipeline::observer::Observer;
 use crate::scene::{CameraPath, CropBox, Identities, IdentityId, NO_IDENTITY, SemanticMap};
 use crate::ui::actions::{Face, Pane};
@@ -319,7 +318,7 @@ pub(in crate::ui) fn turntable(app: &mut App, id: Option<IdentityId>) {
         return;
     }
     let bounds = of.and_then(|id| app.viewport.bounds_of(id, &app.state)).unwrap_or(scene.home.bounds);
-    let Some(path) = turntable::turntable(&app.viewport.pose(), &bounds, app.viewport.up(&scene)) else {
+    let Some(path) = app.viewport.pose().turntable(&bounds, app.viewport.up(&scene)) else {
         return app.state.toast(Tone::Warning, "There is no way around it from here: move the view first.");
     };
     if !app.camera.path.keys.is_empty() {

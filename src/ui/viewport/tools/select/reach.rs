@@ -8,9 +8,9 @@ use crate::scene::{Camera, GaussianCloud, Mask};
 const ON_SURFACE: f64 = 0.02;
 
 /// Numbers of the drawn Gaussians; `None` draws all.
-pub(super) type Drawn<'a> = Option<&'a [usize]>;
+pub(super) type DrawnOnly<'a> = Option<&'a [usize]>;
 
-fn all_drawn(cloud: &GaussianCloud, drawn: Drawn<'_>, takes: impl Fn(usize) -> bool) -> Vec<u32> {
+fn all_drawn(cloud: &GaussianCloud, drawn: DrawnOnly<'_>, takes: impl Fn(usize) -> bool) -> Vec<u32> {
     match drawn {
         Some(drawn) => drawn.iter().copied().filter(|i| takes(*i)).map(|i| i as u32).collect(),
         None => (0..cloud.len()).filter(|i| takes(*i)).map(|i| i as u32).collect(),
@@ -21,7 +21,7 @@ fn all_drawn(cloud: &GaussianCloud, drawn: Drawn<'_>, takes: impl Fn(usize) -> b
 /// on or before the surface.
 pub(super) fn under(
     cloud: &GaussianCloud,
-    drawn: Drawn<'_>,
+    drawn: DrawnOnly<'_>,
     camera: &Camera,
     depth: Option<&[f32]>,
     area: &Mask,
@@ -48,7 +48,7 @@ pub(super) fn under(
 }
 
 /// Gaussians with centers in any of the balls, each a middle and a radius in scene units.
-pub(super) fn in_balls(cloud: &GaussianCloud, drawn: Drawn<'_>, balls: &[(DVec3, f64)]) -> Vec<u32> {
+pub(super) fn in_balls(cloud: &GaussianCloud, drawn: DrawnOnly<'_>, balls: &[(DVec3, f64)]) -> Vec<u32> {
     all_drawn(cloud, drawn, |i| {
         let at = cloud.world_position(i);
         balls.iter().any(|(middle, radius)| at.distance_squared(*middle) <= radius * radius)
@@ -57,7 +57,7 @@ pub(super) fn in_balls(cloud: &GaussianCloud, drawn: Drawn<'_>, balls: &[(DVec3,
 
 /// Gaussians whose view-independent color is within `tolerance` of `color`, as a distance in red, green and blue, 0 to
 /// 1 each.
-pub(super) fn of_color(cloud: &GaussianCloud, drawn: Drawn<'_>, color: [u8; 3], tolerance: f32) -> Vec<u32> {
+pub(super) fn of_color(cloud: &GaussianCloud, drawn: DrawnOnly<'_>, color: [u8; 3], tolerance: f32) -> Vec<u32> {
     let color = color.map(|v| f32::from(v) / 255.0);
     all_drawn(cloud, drawn, |i| {
         let own = cloud.mean_color(i);
