@@ -107,7 +107,8 @@ fn points_are_put_taken_back_and_left() {
         }
     }
     assert!(hit.len() > 1 && disabled(&w), "each was taken back: {hit:?}");
-    let (first, last) = (hit[0], hit[hit.len() - 1]);
+    let (first, last) = (hit[hit.len() / 3], hit[2 * hit.len() / 3]);
+    w.until("a picture at rest", |a| a.viewport.picture().is_some_and(|p| p.full && p.median_depth.is_some()));
     click_view(&mut w, first);
     assert!(w.shows("Click the next point"));
     click_view(&mut w, last);

@@ -25,7 +25,13 @@ fn view(w: &Window) -> Rect {
 /// Begins to select by a shape, once all is drawn.
 fn select_by(w: &mut Window, shape: SelectShape) {
     w.ask(Action::SelectBy(shape));
-    w.until("all is drawn", |a| a.viewport.picture().is_some_and(|p| p.full && p.median_depth.is_some()));
+    let height = |wide: u32, view: Rect| (wide as f32 * view.height() / view.width()).round() as u32;
+    let rect = view(w);
+    // The panes have just been closed, so the frame before has another shape.
+    w.until("all is drawn", |a| {
+        let fits = |c: &fmlgs::scene::Camera| c.height_px.abs_diff(height(c.width_px, rect)) < 3;
+        a.viewport.picture().is_some_and(|p| p.full && p.median_depth.is_some() && fits(&p.camera))
+    });
 }
 
 /// The number of selected Gaussians, once all is at rest.
@@ -47,17 +53,16 @@ fn click(w: &mut Window, at: Pos2, modifiers: Modifiers) {
     w.harness.run_steps(4);
 }
 
-/// The place in the window of the Gaussian that is nearest to the eye, amid the view.
+/// The place in the window of the surface that is nearest to the eye, amid the view and above the card.
 fn nearest(w: &Window) -> Pos2 {
-    let camera = w.app().viewport.picture().expect("a picture").camera.clone();
-    let all = cloud(w.app());
-    let size = glam::DVec2::new(f64::from(camera.width_px), f64::from(camera.height_px));
-    let amid = |at: glam::DVec2| at.cmpgt(0.3 * size).all() && at.cmplt(0.7 * size).all();
-    let seen = (0..all.len()).map(|i| all.world_position(i)).filter(|at| camera.project(*at).is_some_and(amid));
-    let depth = |at: &glam::DVec3| camera.camera_from_world(*at).z;
-    let nearest = seen.min_by(|a, b| depth(a).total_cmp(&depth(b))).expect("a Gaussian");
-    let at = camera.project(nearest).expect("before the eye") / size.x * f64::from(view(w).width());
-    view(w).min + vec2(at.x as f32, at.y as f32)
+    let picture = w.app().viewport.picture().expect("a picture");
+    let depth = picture.median_depth.as_deref().expect("depths");
+    let [wide, high] = [picture.camera.width_px, picture.camera.height_px].map(|side| side as usize);
+    let is_surface = |at: usize| (at - 12..at + 12).all(|k| depth[k] > 0.0);
+    let rows = high / 5..high / 2;
+    let all = rows.flat_map(|y| (3 * wide / 10..7 * wide / 10).map(move |x| y * wide + x)).filter(|at| is_surface(*at));
+    let at = all.min_by(|a, b| depth[*a].total_cmp(&depth[*b])).expect("a surface");
+    view(w).min + vec2((at % wide) as f32, (at / wide) as f32) * (view(w).width() / wide as f32)
 }
 
 #[test]
