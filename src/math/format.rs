@@ -189,7 +189,7 @@ pub(crate) fn volume(cubic_units: f64, meters_per_unit: Option<f64>) -> String {
 /// A number of an axis: at most four significant digits, none of them needless.
 pub(crate) fn tick(v: f64) -> String {
     match v.abs() {
-        a if (1e-3..1e5).contains(&a) => format!("{}", significant(v)),
+        a if a == 0.0 || (1e-3..1e5).contains(&a) => format!("{}", significant(v)),
         _ => format!("{:e}", significant(v)),
     }
 }

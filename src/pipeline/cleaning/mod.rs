@@ -108,7 +108,7 @@ pub enum CleanError {
     Io(#[from] IoError),
     #[error(transparent)]
     Render(#[from] RenderError),
-    #[error(transparent)]
+    #[error("canceled")]
     Interrupted(#[from] Interrupted),
 }
 

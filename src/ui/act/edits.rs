@@ -158,8 +158,9 @@ fn record(app: &mut App, editing: Editing) {
     // A refused or failed edit was reported and leaves nothing to undo.
     if let Some(what) = app.state.changes.settle(&snapshot(app), Some(&what)) {
         app.state.toast(Tone::Good, sentence(&what));
-        for name in emptied {
-            let text = format!("{name} is empty now: all of its Gaussians became others'. Undo brings them back.");
+        if let [first, others @ ..] = emptied.as_slice() {
+            let are = if others.is_empty() { "is".to_owned() } else { format!("and {} more are", others.len()) };
+            let text = format!("{first} {are} empty now: no Gaussians are left there. Undo brings them back.");
             app.state.toast(Tone::Warning, text);
         }
     }

@@ -115,12 +115,12 @@ fn open_by(
 /// Opens another scene by `open`; asks first if that ends a running job.
 fn replace_scene(app: &mut App, open: impl FnOnce(&mut App) + 'static) {
     // A job on another computer continues there.
-    let running = app.state.job.as_ref().filter(|job| !remote::is_remote(job.id)).map(|job| job.info.title.clone());
-    let Some(title) = running else {
+    let running = app.state.job.as_ref().filter(|job| !remote::is_remote(job.id));
+    let running = running.map(|job| format!("{} is still running. Cancel it? {}", job.info.title, job.leaves()));
+    let Some(text) = running else {
         remote::disconnect(app);
         return open(app);
     };
-    let text = format!("{title} is still running. Cancel it and continue? Saved progress is kept.");
     let question = Question { text, yes: "Cancel and continue", other: None, no: "Keep running", deletes: false };
     app.put_question(question, |app, answer| {
         if answer == DialogAnswer::Yes {

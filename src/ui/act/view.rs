@@ -17,6 +17,7 @@ use crate::ui::actions::{Face, Pane};
 use crate::ui::app::App;
 use crate::ui::color_by::ColorBy;
 use crate::ui::context::SceneContext;
+use crate::ui::dialogs::{DialogAnswer, Question};
 use crate::ui::labels;
 use crate::ui::state::Tone;
 use crate::worker::{JobInfo, Versioned, ViewMode};
@@ -126,8 +127,14 @@ pub(in crate::ui) fn dismiss(app: &mut App, ctx: &Context) {
         app.viewport.picking.select(None);
     } else if app.full_view {
         window::fill(app, ctx);
-    } else {
-        remote::cancel_job(app);
+    } else if let Some(job) = app.state.job.as_ref().filter(|job| !job.canceling) {
+        let text = format!("Cancel \u{201c}{}\u{201d}? {}", job.info.title, job.leaves());
+        let question = Question { text, yes: "Cancel it", other: None, no: "Keep running", deletes: false };
+        app.put_question(question, |app, answer| {
+            if answer == DialogAnswer::Yes {
+                remote::cancel_job(app);
+            }
+        });
     }
 }
 

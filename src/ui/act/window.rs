@@ -21,11 +21,7 @@ pub(in crate::ui) fn watch_close(app: &mut App, ctx: &Context) {
         return;
     };
     ctx.send_viewport_cmd(ViewportCommand::CancelClose);
-    let kept = match job.info.makes {
-        Makes::Gaussians => "It goes on from its last checkpoint next time.",
-        _ => "It begins again next time.",
-    };
-    let text = format!("{} is still running. {kept}", job.info.title);
+    let text = format!("{} is still running. {}", job.info.title, job.leaves());
     let question = Question { text, yes: "Quit", other: None, no: "Keep running", deletes: false };
     app.put_question(question, |app, answer| app.quits = answer == DialogAnswer::Yes);
 }

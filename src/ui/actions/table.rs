@@ -53,7 +53,7 @@ macro_rules! action_table {
                 => train::pause(app);
             Cancel: "Cancel the running job", "Stop the running job at its next step. Progress so far is kept."
                 => remote::cancel_job(app);
-            Dismiss: "Deselect, or cancel the running job", "Deselect what is selected; with nothing selected, stop the running job.",
+            Dismiss: "Deselect, or cancel the running job", "Deselect what is selected; with nothing selected, ask whether to stop the running job.",
                 "Escape" => view::dismiss(app, ctx);
             Evaluate: "Evaluate on held-out photos", "PSNR and SSIM on photos held out from training."
                 => train::evaluate(app);

@@ -197,6 +197,7 @@ impl OwnDialog {
     fn button(&self) -> &'static str {
         match (&self.request.purpose, self.request.kind.is_scene()) {
             (PathPurpose::Save(_), _) => "Save",
+            (PathPurpose::Folder { creates: true }, _) => "Save here",
             (PathPurpose::Folder { .. }, false) => "Choose",
             _ => "Open",
         }

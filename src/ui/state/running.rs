@@ -2,7 +2,7 @@
 
 use super::AppState;
 use crate::pipeline::observer::Progress;
-use crate::worker::{JobId, JobInfo};
+use crate::worker::{JobId, JobInfo, Makes};
 
 /// Time constant of the average over forecasts, s.
 const FORECAST_SECS: f64 = 30.0;
@@ -32,6 +32,15 @@ impl RunningJob {
             (true, _) => format!("{}: canceling\u{2026}", self.info.title),
             (_, true) => format!("{} (paused)", self.info.title),
             _ => self.info.title.clone(),
+        }
+    }
+
+    /// Sentence on what is left of the job if it is ended now.
+    pub(crate) fn leaves(&self) -> &'static str {
+        match self.info.makes {
+            Makes::Gaussians => "It goes on from its last checkpoint next time.",
+            Makes::Objects => "It goes on where it was next time.",
+            Makes::Scene | Makes::Nothing => "What it has done so far is discarded.",
         }
     }
 

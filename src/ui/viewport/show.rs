@@ -123,12 +123,13 @@ impl Viewport {
         cx: &mut Ctx<'_>,
     ) -> bool {
         let state = cx.state;
-        let mut on_camera = false;
+        // The outlines of an answer would look like the selection.
+        let (mut on_camera, selects) = (false, self.is_selecting());
         for area in areas {
             self.queries.work_in(area.second);
             self.display.paint(ui, area.rect, area.shown, area.second);
             // Answers belong to the scene, not to another one beside it.
-            if let Some(semantics) = state.semantics.as_ref().filter(|_| !area.is_other) {
+            if let Some(semantics) = state.semantics.as_ref().filter(|_| !area.is_other && !selects) {
                 let lit = cx.layout.dim.then(|| self.picking.selected().into_iter().collect());
                 self.queries.paint(ui, area.shown, semantics, lit);
             }

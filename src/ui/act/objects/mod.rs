@@ -267,7 +267,10 @@ pub(in crate::ui) fn submit_removal(app: &mut App, request: RemoveRequest) {
 /// Asks for confirmation, and deletes the scene made by a removal.
 pub(in crate::ui) fn ask_to_delete_removed(app: &mut App) {
     let Some(removed) = &app.state.removed else {
-        return app.state.toast(Tone::Warning, "No scene was made by removing something from this one.");
+        return app.state.toast(
+            Tone::Warning,
+            "Only the scene that the latest removal made, while it is shown beside this one, is deleted here.",
+        );
     };
     let (name, folder) = (&removed.name, removed.folder.display());
     let text = format!(
