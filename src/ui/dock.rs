@@ -149,14 +149,16 @@ impl Dock {
         let front = tree.active_tiles();
         self.hidden.extend(front.iter().filter(|id| !self.front.contains(id)).map(|id| (*id, REVEALS)));
         self.hidden.retain(|(id, left)| *left > 0 && front.contains(id));
-        let hidden = &mut self.hidden;
+        let hidden = &self.hidden;
         let mut shown = Shown { contents, view: tree.tiles.find_pane(&Place::View), detach: None, hidden };
         tree.ui(&mut shown, ui);
         self.front = front;
         if let Some(pane) = shown.detach {
             self.detach(pane, true);
         }
-        if !self.hidden.is_empty() {
+        // Counted here: a pane alone in its place has no tab.
+        self.hidden.iter_mut().for_each(|(_, left)| *left = left.saturating_sub(1));
+        if self.hidden.iter().any(|(_, left)| *left > 0) {
             ui.ctx().request_repaint();
         }
     }
@@ -210,7 +212,7 @@ struct Shown<'a> {
     /// The tile of the view.
     view: Option<TileId>,
     detach: Option<Pane>,
-    hidden: &'a mut Vec<(TileId, u8)>,
+    hidden: &'a [(TileId, u8)],
 }
 
 impl Shown<'_> {
@@ -244,12 +246,10 @@ impl Behavior<Place> for Shown<'_> {
 
     fn on_tab_button(&mut self, tiles: &mut Tiles<Place>, id: TileId, button: Response) -> Response {
         let Some(Place::Pane(pane)) = tiles.get_pane(&id).copied() else { return button };
-        if let Some((_, left)) = self.hidden.iter_mut().find(|(of, _)| *of == id) {
-            // A tab that comes to the front shows all of its name.
-            *left = left.saturating_sub(1);
-            if button.interact_rect.width() < button.rect.width() - 1.0 {
-                button.scroll_to_me_animation(None, egui::style::ScrollAnimation::none());
-            }
+        // A tab that comes to the front shows all of its name.
+        let is_cut = button.interact_rect.width() < button.rect.width() - 1.0;
+        if is_cut && self.hidden.iter().any(|(of, _)| *of == id) {
+            button.scroll_to_me_animation(None, egui::style::ScrollAnimation::none());
         }
         button.context_menu(|ui| self.menu(ui, pane));
         button.on_hover_text(format!("{}: drag to move, right-click for more", pane.text()))
