@@ -21,7 +21,7 @@ pub(crate) fn open(path: &Path) -> Result<CameraPath, IoError> {
     parse(&files::read(path, MAX_BYTES)?, path)
 }
 
-/// As [`open`], from bytes; `path` is for errors.
+/// As [`open()`], from bytes; `path` is for errors.
 pub fn parse(bytes: &[u8], path: &Path) -> Result<CameraPath, IoError> {
     let marks: Marks = files::json(bytes, path)?;
     let camera_path = match marks {

@@ -106,10 +106,10 @@ pub fn open(path: &Path) -> Result<Opened> {
     open_in(path, None)
 }
 
-/// As [`open`], with other axes of a splat than its file or format states.
+/// As [`open()`], with other axes of a splat than its file or format states.
 ///
 /// # Errors
-/// As [`open`], and if axes are given for anything but a splat.
+/// As [`open()`], and if axes are given for anything but a splat.
 pub fn open_in(path: &Path, axes: Option<Axes>) -> Result<Opened> {
     match (open_any(path, axes)?, axes) {
         (opened @ Opened::Cloud(_), _) | (opened, None) => Ok(opened),
