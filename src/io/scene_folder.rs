@@ -81,9 +81,8 @@ impl SceneFolder {
     /// # Errors
     /// If it is no scene, or another process writes to it; nothing is deleted then.
     pub(crate) fn delete_all(folder: &Path) -> Result<(), IoError> {
-        let held = Self::hold(folder, "deleting")?;
         load_info(folder)?;
-        held.take_away()
+        Self::hold(folder, "deleting")?.take_away()
     }
 
     /// Deletes the folder: its path is free at once; files left by a killed process are swept later.
