@@ -134,7 +134,10 @@ impl ExportDialog {
         ui.horizontal_wrapped(|ui| {
             for one in &self.offered {
                 let is_chosen = one.scope == self.scope;
-                if self.offered.len() > 1 && ui.radio(is_chosen, &one.title).clicked() && !is_chosen {
+                if self.offered.len() > 1
+                    && theme::outlined(ui, |ui| ui.radio(is_chosen, &one.title)).clicked()
+                    && !is_chosen
+                {
                     changed = Some(ExportDecision::Change(one.scope));
                 }
             }
@@ -167,7 +170,8 @@ impl ExportDialog {
             let can_write = !matches!(found, Some(Err(_)));
             let mut clicked = false;
             let name = |ui: &mut Ui| {
-                let radio = ui.add_enabled(can_write, egui::RadioButton::new(self.format == format, format.title()));
+                let button = egui::RadioButton::new(self.format == format, format.title());
+                let radio = theme::outlined(ui, |ui| ui.add_enabled(can_write, button));
                 clicked = radio.clicked();
                 let values = format!("{}: size {size}, loss {loss}", format.title());
                 radio.on_hover_text(format.rounding().map_or_else(|| values.clone(), |r| format!("Rounded: {r}.")))
