@@ -16,6 +16,7 @@ use crate::ui::app::App;
 use crate::ui::history::EditStep;
 use crate::ui::select_shape::SelectShape;
 use crate::ui::state::Tone;
+use crate::ui::viewport::splat_selection::SplatSelection;
 
 use crate::worker::JobInfo;
 
@@ -86,11 +87,10 @@ pub(in crate::ui) fn delete_chosen(app: &mut App) {
     let Some((selected, cloud)) = selected.zip(app.viewport.cloud()) else {
         return app.state.toast(Tone::Info, "No Gaussians are selected: select some in the view or in the Clean pane.");
     };
-    let mut gone = vec![false; cloud.len()];
-    selected.iter().for_each(|i| gone.get_mut(*i as usize).into_iter().for_each(|gone| *gone = true));
+    let gone = Arc::new(SplatSelection::of_numbers(cloud.len(), &selected));
     app.viewport.select(None, &app.state);
-    app.clean.deletes(&gone);
-    edits::queue(app, EditStep::Rearrange(SplatEdit::Delete(gone)));
+    app.clean.deletes(Arc::clone(&gone));
+    edits::queue(app, EditStep::Rearrange(SplatEdit::Delete(gone.of.clone())));
 }
 
 /// Turns the name of the selected identity into a text field.

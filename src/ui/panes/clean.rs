@@ -76,8 +76,8 @@ impl CleanPane {
     }
 
     /// Notes that these Gaussians will be deleted: the measures of the others stay.
-    pub(crate) fn deletes(&mut self, gone: &[bool]) {
-        self.deleted = Some(Arc::new(SplatSelection::new(gone.to_vec(), false)));
+    pub(crate) fn deletes(&mut self, gone: Arc<SplatSelection>) {
+        self.deleted = Some(gone);
     }
 
     /// Takes over new measures.

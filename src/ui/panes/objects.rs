@@ -1,15 +1,13 @@
 //! Objects and parts of the scene as a tree; a click selects one and queries it.
 
 use egui::collapsing_header::CollapsingState;
-use egui::{
-    Align, Button, Checkbox, CollapsingHeader, Color32, Id, Key, Layout, Rect, RichText, ScrollArea, TextEdit, Ui, vec2,
-};
+use egui::{Align, Button, Checkbox, CollapsingHeader, Color32, Id, Layout, Rect, RichText, ScrollArea, Ui, vec2};
 
 use super::super::ctx::Ctx;
 use super::super::labels::{self, ScreenNames};
 use super::super::next_step::next_step;
 use super::super::object_menu;
-use super::super::text_field::take_keyboard;
+use super::super::text_field::{NameField, TypedName};
 use super::super::theme;
 use super::super::viewport::Viewport;
 use super::super::viewport::visible::Visibility;
@@ -33,7 +31,7 @@ const MENU_PT: f32 = 22.0;
 /// The list, and the name that is edited in it.
 #[derive(Default)]
 pub(crate) struct ObjectsPane {
-    renaming: Option<Renaming>,
+    renaming: Option<NameField<IdentityId>>,
     /// Identity whose menu is open.
     menu_of: Option<IdentityId>,
     /// Selected identity at the last redraw.
@@ -41,18 +39,10 @@ pub(crate) struct ObjectsPane {
     order: ListOrder,
 }
 
-/// A name that is edited in its row.
-struct Renaming {
-    id: IdentityId,
-    name: String,
-    /// Frames in which the field was drawn, until it has the focus.
-    frames: u8,
-}
-
 impl ObjectsPane {
     /// Makes a text field of a name.
     pub(crate) fn rename(&mut self, id: IdentityId, all: &Identities) {
-        self.renaming = Some(Renaming { id, name: all.name(id), frames: 0 });
+        self.renaming = Some(NameField::new(id, all.name(id)));
     }
 }
 
@@ -125,7 +115,7 @@ struct Tree<'a> {
     facts: RowFacts<'a>,
     object_thumbnails: &'a ObjectThumbnails,
     visibility: &'a Visibility,
-    renaming: &'a mut Option<Renaming>,
+    renaming: &'a mut Option<NameField<IdentityId>>,
     menu_of: &'a mut Option<IdentityId>,
     selected: Option<IdentityId>,
     /// Identity to scroll to.
@@ -157,7 +147,7 @@ impl Tree<'_> {
         }
         let mut state = CollapsingState::load_with_default_open(ui.ctx(), Id::unique("branch").with(id), false);
         let is_within = |piece: IdentityId| self.identities.is_piece(piece, id);
-        let renamed = self.renaming.as_ref().filter(|r| r.frames == 0).map(|r| r.id);
+        let renamed = self.renaming.as_ref().filter(|r| r.is_new()).map(|r| r.of);
         if renamed.into_iter().chain(self.scroll_to).any(is_within) {
             state.set_open(true);
         }
@@ -208,7 +198,7 @@ impl Tree<'_> {
     }
 
     fn name(&mut self, ui: &mut Ui, id: IdentityId, cx: &mut Ctx<'_>) {
-        if self.renaming.as_ref().is_some_and(|r| r.id == id) {
+        if self.renaming.as_ref().is_some_and(|r| r.of == id) {
             return self.name_field(ui, cx);
         }
         let is_selected = self.selected == Some(id);
@@ -231,33 +221,21 @@ impl Tree<'_> {
     }
 
     fn start_renaming(&mut self, id: IdentityId) {
-        *self.renaming = Some(Renaming { id, name: self.identities.name(id), frames: 0 });
+        *self.renaming = Some(NameField::new(id, self.identities.name(id)));
     }
 
-    /// Draws the name as a field with all of it selected. Enter or losing the focus applies the name, Escape does not.
+    /// Draws the name as a field.
     fn name_field(&mut self, ui: &mut Ui, cx: &mut Ctx<'_>) {
-        let Some(Renaming { id, name, frames }) = self.renaming.as_mut() else { return };
-        let field = Id::unique("name").with(*id);
-        let begins = *frames < 2;
-        if begins {
-            // Twice: the selection of the first frame does not last.
-            take_keyboard(ui.ctx(), field, name);
-            *frames += 1;
-        }
-        let edit = ui.add(TextEdit::singleline(name).id(field).char_limit(80).desired_width(f32::INFINITY));
-        let edit = edit.accessible_name("New name");
-        if edit.changed() {
-            *frames = 2;
-        }
-        if begins {
-            edit.scroll_to_me(None);
-        } else if !edit.has_focus() {
-            let is_new = name.trim() != self.identities.name(*id) && !ui.input(|i| i.key_pressed(Key::Escape));
-            if is_new {
-                cx.ask(Action::Change(Edit::Rename(*id, name.clone())));
+        let Some(renaming) = self.renaming.as_mut() else { return };
+        let id = renaming.of;
+        match renaming.show(ui, Id::unique("name").with(id)) {
+            TypedName::Open => return,
+            TypedName::Kept(name) if name.trim() != self.identities.name(id) => {
+                cx.ask(Action::Change(Edit::Rename(id, name)));
             }
-            *self.renaming = None;
+            TypedName::Kept(_) | TypedName::Dropped => {}
         }
+        *self.renaming = None;
     }
 
     /// Draws the menu of actions on an identity.

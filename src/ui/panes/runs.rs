@@ -6,13 +6,13 @@ use std::sync::Arc;
 use std::time::SystemTime;
 
 use egui::{
-    Align, Button, ColorImage, Id, Image, Key, Label, Layout, Rect, RichText, ScrollArea, Sense, Stroke, StrokeKind,
-    TextEdit, TextureHandle, TextureOptions, Ui, UiBuilder, pos2, vec2,
+    Align, Button, ColorImage, Id, Image, Label, Layout, Rect, RichText, ScrollArea, Sense, Stroke, StrokeKind,
+    TextureHandle, TextureOptions, Ui, UiBuilder, pos2, vec2,
 };
 
 use super::super::ctx::Ctx;
 use super::super::state::AppState;
-use super::super::text_field::take_keyboard;
+use super::super::text_field::{NameField, TypedName};
 use super::super::theme;
 use crate::jobs::recent;
 use crate::jobs::runs::{self, RunSummary};
@@ -41,15 +41,7 @@ pub(crate) struct RunsList {
     listed_for: Option<ListedFor>,
     listing: Option<Task<Listed>>,
     pictures: BTreeMap<PathBuf, TextureHandle>,
-    renaming: Option<RunName>,
-}
-
-/// A name that is edited in its row.
-struct RunName {
-    run: PathBuf,
-    name: String,
-    /// Frames in which the field was drawn, until it has the focus.
-    frames: u8,
+    renaming: Option<NameField<PathBuf>>,
 }
 
 impl RunsList {
@@ -145,7 +137,7 @@ impl RunsList {
             ui.spacing_mut().button_padding = vec2(6.0, 1.0);
             let menu = ui.menu_button("\u{2026}", |ui| self.menu(ui, run, is_open, is_training, cx));
             menu.response.on_hover_text(format!("Actions on {}", run.name));
-            if self.renaming.as_ref().is_some_and(|renaming| renaming.run == run.folder) {
+            if self.renaming.as_ref().is_some_and(|renaming| renaming.of == run.folder) {
                 return self.name_field(ui, cx);
             }
             match run.changed {
@@ -174,7 +166,7 @@ impl RunsList {
         }
         // What was made of a training has its name in its own file.
         if run.is_training && ui.button("Rename\u{2026}").clicked() {
-            self.renaming = Some(RunName { run: run.folder.clone(), name: run.name.clone(), frames: 0 });
+            self.renaming = Some(NameField::new(run.folder.clone(), run.name.clone()));
         }
         if ui.button("Show in folder").clicked() {
             cx.ask(Action::ShowFolder(Some(run.folder.clone())));
@@ -191,24 +183,11 @@ impl RunsList {
     }
 
     fn name_field(&mut self, ui: &mut Ui, cx: &mut Ctx<'_>) {
-        let Some(RunName { run, name, frames }) = self.renaming.as_mut() else { return };
-        let field = Id::unique("name of a training");
-        let begins = *frames < 2;
-        if begins {
-            // Twice: the selection of the first frame does not last.
-            take_keyboard(ui.ctx(), field, name);
-            *frames += 1;
-        }
-        let edit = ui.add(TextEdit::singleline(name).id(field).char_limit(80).desired_width(f32::INFINITY));
-        let edit = edit.accessible_name("New name");
-        if edit.changed() {
-            *frames = 2;
-        }
-        if begins || edit.has_focus() {
-            return;
-        }
-        if !ui.input(|i| i.key_pressed(Key::Escape)) {
-            cx.ask(Action::RenameRun(run.clone(), name.clone()));
+        let Some(renaming) = self.renaming.as_mut() else { return };
+        match renaming.show(ui, Id::unique("name of a training")) {
+            TypedName::Open => return,
+            TypedName::Kept(name) => cx.ask(Action::RenameRun(renaming.of.clone(), name)),
+            TypedName::Dropped => {}
         }
         self.renaming = None;
     }

@@ -24,6 +24,13 @@ impl SplatSelection {
         Self { of, count, hide }
     }
 
+    /// Marks these Gaussians among `n`.
+    pub(crate) fn of_numbers(n: usize, numbers: &[u32]) -> Self {
+        let mut of = vec![false; n];
+        numbers.iter().for_each(|i| of.get_mut(*i as usize).into_iter().for_each(|of| *of = true));
+        Self::new(of, false)
+    }
+
     /// True if a Gaussian is drawn.
     pub(super) fn draws(&self, i: usize) -> bool {
         !self.hide || self.of.get(i) != Some(&true)

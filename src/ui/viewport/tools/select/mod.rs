@@ -206,11 +206,8 @@ impl SelectTool {
     /// The selection as marks of a cloud of `n` Gaussians, if each is to be marked.
     pub(crate) fn marked(&mut self, n: usize) -> Option<Arc<SplatSelection>> {
         let selected = self.selected.as_ref().filter(|s| self.marks && s.id != NO_IDENTITY)?;
-        let marked = self.marked.get_or_insert_with(|| {
-            let mut of = vec![false; n];
-            selected.gaussians.iter().for_each(|i| of.get_mut(*i as usize).into_iter().for_each(|of| *of = true));
-            Arc::new(SplatSelection::new(of, false))
-        });
+        let marks = || Arc::new(SplatSelection::of_numbers(n, &selected.gaussians));
+        let marked = self.marked.get_or_insert_with(marks);
         Some(Arc::clone(marked))
     }
 
