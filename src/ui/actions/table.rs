@@ -139,7 +139,7 @@ macro_rules! action_table {
                 "Remove it again, with another choice of what hides below it; the scene made before stays."
                 => objects::submit_removal(app, *request);
             DeleteRemoved: "Delete this scene\u{2026}",
-                "Delete the scene that was made by removing something, which is shown beside this one. This one stays."
+                "Delete the scene of a removal that is shown beside this one; without one, the open scene."
                 => objects::ask_to_delete_removed(app);
             Transform(id: IdentityId): format!("Transform #{id}"),
                 "Drag it along the axes, turn, scale, duplicate or recolor it; can be undone." => edit::transform(app, id);

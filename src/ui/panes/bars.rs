@@ -71,6 +71,7 @@ pub(crate) fn top(ui: &mut Ui, cx: &mut Ctx<'_>, view: &Viewport) {
             ui.separator();
             item(ui, has_scene, None, Action::SaveCopy, cx);
             item(ui, has_scene, None, Action::ShowFolder(None), cx);
+            item(ui, has_scene, None, Action::DeleteRemoved, cx);
             ui.separator();
             item(ui, true, None, Action::Quit, cx);
         });

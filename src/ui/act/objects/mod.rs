@@ -264,14 +264,9 @@ pub(in crate::ui) fn submit_removal(app: &mut App, request: RemoveRequest) {
     });
 }
 
-/// Asks for confirmation, and deletes the scene made by a removal.
+/// Asks for confirmation, and deletes the scene made by a removal, while it is shown beside the open one.
 pub(in crate::ui) fn ask_to_delete_removed(app: &mut App) {
-    let Some(removed) = &app.state.removed else {
-        return app.state.toast(
-            Tone::Warning,
-            "Only the scene that the latest removal made, while it is shown beside this one, is deleted here.",
-        );
-    };
+    let Some(removed) = &app.state.removed else { return super::runs::ask_to_delete_open(app) };
     let (name, folder) = (&removed.name, removed.folder.display());
     let text = format!(
         "Delete the copy without \u{201c}{name}\u{201d}? The original stays. This cannot be undone.\n\n{folder}"
