@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use glam::{DVec2, DVec3};
 
-use super::eye::Eye;
+use super::eye::{Eye, is_in_view};
 use super::photo::PhotoView;
 use super::splat_selection::SplatSelection;
 use super::straight::front_of;
@@ -141,6 +141,10 @@ impl Viewport {
 
     /// Turns to `bounds` if not all of it is in a view of this size.
     pub(super) fn keep_in_view(&mut self, bounds: &Bounds, view: egui::Vec2, now: f64) {
+        // All of a photo's frame is always shown.
+        if self.photo.as_ref().is_some_and(|photo| is_in_view(photo.camera(), bounds, 0.0)) {
+            return;
+        }
         let before = self.eye.clone();
         let fov = self.photo.as_ref().map(|photo| photo.free_fov(before.fov_y_rad));
         let mut eye = Eye { fov_y_rad: fov.unwrap_or(before.fov_y_rad), ..before };

@@ -125,9 +125,7 @@ impl Eye {
     /// of it. Returns true if it has moved.
     pub(super) fn turn_to(&mut self, bounds: &Bounds, aspect: f64) -> bool {
         let camera = self.camera((1000.0 * aspect).round() as u32, 1000);
-        let size = DVec2::new(f64::from(camera.width_px), f64::from(camera.height_px));
-        let is_in = |p: DVec2| p.cmpge(DVec2::ZERO).all() && p.cmple(size).all();
-        if bounds.corners().into_iter().all(|p| camera.project(p).is_some_and(is_in)) {
+        if is_in_view(&camera, bounds, 0.0) {
             return false;
         }
         let middle = bounds.center();
@@ -203,6 +201,13 @@ impl Eye {
         let Some(right) = (m.x_axis - forward * m.x_axis.dot(forward)).try_normalize() else { return };
         self.world_from_eye = DMat3::from_cols(right, forward.cross(right), forward);
     }
+}
+
+/// True if a camera sees all corners, none of them at a border of its picture; `border` is a share of its size.
+pub(super) fn is_in_view(camera: &Camera, bounds: &Bounds, border: f64) -> bool {
+    let size = DVec2::new(f64::from(camera.width_px), f64::from(camera.height_px));
+    let is_in = |p: DVec2| p.cmpge(border * size).all() && p.cmple((1.0 - border) * size).all();
+    bounds.corners().into_iter().all(|p| camera.project(p).is_some_and(is_in))
 }
 
 #[cfg(test)]

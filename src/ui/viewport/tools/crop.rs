@@ -3,6 +3,7 @@
 use egui::{Button, Color32, CursorIcon, DragValue, Grid, Id, Pos2, Rect, Sense, Stroke, Ui, Vec2, vec2};
 use glam::DVec3;
 
+use super::super::eye::is_in_view;
 use super::super::frusta::clipped;
 use super::super::split::ViewArea;
 use super::card::ToolCard;
@@ -41,16 +42,10 @@ impl CropTool {
             let share = SHRINK.powi(step);
             Bounds { min: middle.lerp(content.min, share), max: middle.lerp(content.max, share) }
         };
-        let bounds = std::iter::once(all).chain((0..MOST_SHRUNK).map(shrunk)).find(|bounds| is_in_view(eye, bounds));
+        let bounds =
+            std::iter::once(all).chain((0..MOST_SHRUNK).map(shrunk)).find(|bounds| is_in_view(eye, bounds, BORDER));
         Self { offered: CropBox { bounds: bounds.unwrap_or(*content), outside: false } }
     }
-}
-
-/// True if all corners are in the picture, not at its very border.
-fn is_in_view(eye: &Camera, bounds: &Bounds) -> bool {
-    let size = glam::DVec2::new(f64::from(eye.width_px), f64::from(eye.height_px));
-    let is_in = |p: glam::DVec2| p.cmpge(BORDER * size).all() && p.cmple((1.0 - BORDER) * size).all();
-    bounds.corners().into_iter().all(|p| eye.project(p).is_some_and(is_in))
 }
 
 impl ViewTool for CropTool {
@@ -226,12 +221,12 @@ mod tests {
         let offered = |cloud, eye: &Camera| CropTool::new(cloud, &content, eye, content.center()).offered.bounds;
         let far = from(60.0);
         let first = offered(Some(&cloud), &far);
-        assert!((0..101).all(|i| is_in(&first, i)) && is_in_view(&far, &first), "{first:?}");
+        assert!((0..101).all(|i| is_in(&first, i)) && is_in_view(&far, &first, BORDER), "{first:?}");
         // From within the scene that box has no edge in view: a smaller one is offered, which has.
         let near = from(0.7);
-        assert!(!is_in_view(&near, &first) && !is_in_view(&near, &content), "the control");
+        assert!(!is_in_view(&near, &first, BORDER) && !is_in_view(&near, &content, BORDER), "the control");
         let first = offered(Some(&cloud), &near);
-        assert!(is_in_view(&near, &first) && is_in(&first, 50) && !is_in(&first, 100), "{first:?}");
+        assert!(is_in_view(&near, &first, BORDER) && is_in(&first, 50) && !is_in(&first, 100), "{first:?}");
         // The box of the content leaves the stray one out; without Gaussians it is all that is known.
         assert!(!is_in(&content, 100));
         let without = offered(None, &far);
