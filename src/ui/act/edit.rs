@@ -81,9 +81,12 @@ pub(in crate::ui) fn refine_chosen(app: &mut App) {
     app.viewport.select_from(SelectFor::New(NO_IDENTITY), Some(SelectShape::Brush), first, &app.state);
 }
 
-/// Deletes the selected Gaussians: those of the tool, else those of the Clean pane.
+/// Deletes the selected Gaussians: those of the selection tool while it is in use, else those of the Clean pane.
 pub(in crate::ui) fn delete_chosen(app: &mut App) {
-    let selected = app.viewport.selected_gaussians().map(<[u32]>::to_vec).or_else(|| app.clean.chosen());
+    let selected = match app.viewport.is_selecting() {
+        true => app.viewport.selected_gaussians().map(<[u32]>::to_vec),
+        false => app.clean.chosen(),
+    };
     let Some((selected, cloud)) = selected.zip(app.viewport.cloud()) else {
         return app.state.toast(Tone::Info, "No Gaussians are selected: select some in the view or in the Clean pane.");
     };

@@ -47,7 +47,7 @@ pub(in crate::ui) fn crop(app: &mut App) {
         return;
     }
     if app.viewport.visibility.crop().is_none() {
-        return app.state.toast(Tone::Info, "There is no crop box yet: press B.");
+        return app.state.toast(Tone::Info, "There is no crop box yet: press B, and drag its faces.");
     }
     open(app, ExportScope::Crop);
 }

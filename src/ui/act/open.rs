@@ -42,18 +42,32 @@ pub(in crate::ui) fn open(app: &mut App, path: PathBuf) {
     if path.extension().is_some_and(|e| e == "toml") {
         return preset(app, &path);
     }
+    // A scene beside this one, or made from it, is of the same place.
+    let is_beside = app.state.comparison.as_ref().is_some_and(|other| other.path == path);
+    let is_made_of_it = app.state.removed.as_ref().is_some_and(|removed| removed.folder == path);
+    let is_kin = is_beside || is_made_of_it;
     replace_scene(app, move |app| {
         let (workspace, title) = (Arc::clone(&app.workspace), format!("Opening {}", file_name(&path)));
         let info = JobInfo::urgent(title).makes(Makes::Scene);
         app.start(
             info,
             move |observer| workspace.open(&path, observer),
-            |app, opened| match opened {
-                OpenedPath::Scene(scene) => app.state.opened(*scene, false),
+            move |app, opened| match opened {
+                OpenedPath::Scene(scene) => {
+                    if is_kin || app.state.scene.as_ref().is_some_and(|before| is_same_place(before, &scene)) {
+                        app.viewport.keep_place();
+                    }
+                    app.state.opened(*scene, false);
+                }
                 OpenedPath::Unposed(photos) => app.state.unposed = Some(photos),
             },
         );
     });
+}
+
+/// True if both scenes are results of the same photos.
+fn is_same_place(before: &OpenedScene, now: &OpenedScene) -> bool {
+    before.trained && now.trained && before.dataset_path.is_some() && before.dataset_path == now.dataset_path
 }
 
 /// Finds the camera poses of photos, and opens the result.

@@ -241,6 +241,8 @@ macro_rules! action_table {
                 => app.layout.dim = !app.layout.dim;
             ToggleCameras: "Show or hide cameras", "Show the cameras of the nearest photos, while nothing is asked for, selected or in use.", "V"
                 => app.layout.cameras = !app.layout.cameras;
+            ToggleMeasurements: "Show or hide measurements", "Draw kept measurements into the view, also while nothing is measured."
+                => app.layout.measurements = !app.layout.measurements;
             TogglePane(pane: Pane): format!("Show or hide the {} pane", pane.text().to_lowercase()),
                 "Show or hide this pane." => app.layout.toggle(pane);
             FillWindow: "Fill the window with the view", "Show only the view, full screen; again to show everything.", "F11"

@@ -94,6 +94,8 @@ pub(crate) fn top(ui: &mut Ui, cx: &mut Ctx<'_>, view: &Viewport) {
             });
             ui.separator();
             item(ui, has_photos, Some(cx.layout.cameras), Action::ToggleCameras, cx);
+            let has_measured = !view.measurements.is_empty();
+            item(ui, has_measured, Some(cx.layout.measurements), Action::ToggleMeasurements, cx);
             item(ui, has_photos, Some(cx.layout.compare), Action::ToggleCompare, cx);
             item(ui, has_scene, Some(cx.layout.split_view), Action::ToggleSplit, cx);
             item(ui, cx.layout.split_view, Some(false), Action::OtherView, cx);
@@ -194,6 +196,7 @@ pub(crate) fn top(ui: &mut Ui, cx: &mut Ctx<'_>, view: &Viewport) {
 fn item(ui: &mut Ui, enabled: bool, on: Option<bool>, action: Action, cx: &mut Ctx<'_>) {
     let text = match &action {
         Action::ToggleCameras => "Cameras".to_owned(),
+        Action::ToggleMeasurements => "Measurements".to_owned(),
         Action::ToggleTimes => "Frame times".to_owned(),
         Action::TogglePane(pane) => pane.text().to_owned(),
         other => other.text(),

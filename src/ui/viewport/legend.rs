@@ -27,14 +27,18 @@ pub(super) fn show(
     ui: &mut Ui,
     settings: &mut OverlaySettings,
     depth: Option<(f32, f32)>,
+    is_orthographic: bool,
     shares: Option<[f64; 2]>,
     photo: Option<&str>,
     cx: &mut Ctx<'_>,
 ) {
     ui.vertical(|ui| {
         if let Some((near, far)) = depth {
-            ui.label(RichText::new("Depth, units").small());
-            bar(ui, Colormap::Turbo, [near, far].map(|d| format!("{d:.2}")));
+            // The camera of an orthographic view is far away, and its distance means nothing.
+            let (text, from) =
+                if is_orthographic { ("Depth from the nearest point, units", near) } else { ("Depth, units", 0.0) };
+            ui.label(RichText::new(text).small());
+            bar(ui, Colormap::Turbo, [near, far].map(|d| format!("{:.2}", d - from)));
         }
         let meaning = match settings.color_by {
             ColorBy::Masks => return,

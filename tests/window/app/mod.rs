@@ -24,6 +24,7 @@ mod selecting;
 mod shapes;
 mod split;
 mod typing;
+mod views;
 
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;

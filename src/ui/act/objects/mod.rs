@@ -9,7 +9,7 @@ use crate::jobs::find_objects::{self, FindRequest, FindSettings};
 use crate::jobs::models::{self, Source};
 use crate::jobs::remove::{self as removal, RemovalOptions, RemoveRequest};
 use crate::pipeline::observer::Observer;
-use crate::scene::{IdentityId, SemanticMap};
+use crate::scene::{Bounds, IdentityId, SemanticMap};
 use crate::ui::app::App;
 use crate::ui::dialogs::{DialogAnswer, Question};
 use crate::ui::file_dialogs::{FileFormat, FileRequest};
@@ -260,6 +260,11 @@ pub(in crate::ui) fn submit_removal(app: &mut App, request: RemoveRequest) {
         app.state.toast(Tone::Good, removal::summary(&removed.name, &removed.report));
         app.state.say(Tone::Info, format!("Saved to {}", removed.folder.display()));
         super::open::compare_scene(app, Some(removed.folder.clone()));
+        // Both views show the place of what was removed.
+        let all = removed.request.options.ids.iter().filter_map(|id| app.viewport.bounds_of(*id, &app.state));
+        if let Some(bounds) = all.reduce(|a, b| Bounds { min: a.min.min(b.min), max: a.max.max(b.max) }) {
+            app.viewport.ask_for(bounds);
+        }
         app.state.removed = Some(removed);
     });
 }

@@ -2,10 +2,11 @@
 
 use std::sync::Arc;
 
-use egui::{Align2, Area, Color32, DragValue, Id, Order, Rect, Sense, Stroke, Ui, Vec2, vec2};
+use egui::{Color32, DragValue, Id, Rect, Sense, Stroke, Ui, Vec2};
 use glam::{DQuat, DVec3};
 
 use super::super::split::ViewArea;
+use super::card::ToolCard;
 use super::crop::{on_screen, travel};
 use super::{CardPlaces, ToolScene, ViewTool};
 use crate::jobs::rearrange::{Arrangement, SplatEdit, apply};
@@ -104,14 +105,9 @@ impl TransformTool {
 
     /// Draws the card of the tool.
     fn show_card(&mut self, ui: &Ui, rect: Rect, all: &Identities, cx: &mut Ctx<'_>) {
-        // Above the facts about the frame.
-        let at = Align2::LEFT_BOTTOM.pos_in_rect(&rect.shrink(12.0)) - vec2(0.0, 40.0);
-        let area = Area::new(Id::unique("arranging")).order(Order::Foreground).pivot(Align2::LEFT_BOTTOM);
-        theme::card(ui.ctx(), area.fixed_pos(at).constrain_to(rect), |ui| {
-            ui.label(format!(
-                "Move \u{201c}{}\u{201d}: drag an arrow or type values",
-                all.full_name(self.arrangement.id)
-            ));
+        let name = all.full_name(self.arrangement.id);
+        let title = format!("Move \u{201c}{name}\u{201d}: drag an arrow or type values");
+        ToolCard::in_corner("arranging", title, rect).show(ui, |ui, _| {
             ui.horizontal(|ui| {
                 ui.label("Move");
                 for (axis, name) in ["x", "y", "z"].into_iter().enumerate() {
