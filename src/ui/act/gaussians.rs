@@ -9,6 +9,7 @@ use super::open::file_name;
 use crate::io::splat_format::SplatFormat;
 use crate::jobs::export;
 use crate::jobs::export_splat::{self, LossViews};
+use crate::jobs::phases;
 use crate::math::format;
 use crate::pipeline::observer::Observer;
 use crate::scene::{GaussianCloud, IdentityId};
@@ -129,7 +130,7 @@ fn save(app: &mut App, dialog: &ExportDialog) {
     let request = FileRequest::save(FileKind::Gaussians, "Export Gaussians", dialog.stem(), formats);
     let cloud = Arc::clone(&dialog.cloud);
     app.choose(request.with_format(format), |app, path| {
-        let info = JobInfo::short(format!("Writing {}", file_name(&path)));
+        let info = JobInfo::short(format!("Writing {}", file_name(&path))).phases(phases::EXPORT);
         let write = move |observer: &mut dyn Observer| {
             let views = LossViews::of_cloud(&cloud);
             export_splat::run(&cloud, &path, Some(&views), observer)?.tell_loss(observer);

@@ -158,6 +158,21 @@ fn what_has_arrived_of_a_download_is_said_and_need_not_come_again() {
 }
 
 #[test]
+fn the_dialog_opens_with_the_models_of_the_last_search() {
+    let mut last = FindSettings::default();
+    let mut dialog = FindDialog::default();
+    dialog.open(&last);
+    let best = dialog.means(&list());
+    assert!(best.segmenter != REGIONS && best.encoder != NO_ENCODER, "{best:?}");
+    // The program was closed since, and a network is gone from the list.
+    (last.segmenter, last.encoder) = (Some(REGIONS.into()), Some("a network of before".into()));
+    let mut dialog = FindDialog::default();
+    dialog.open(&last);
+    let means = dialog.means(&list());
+    assert_eq!((means.segmenter.as_str(), means.encoder), (REGIONS, best.encoder));
+}
+
+#[test]
 fn the_next_search_follows_the_recipe_on_screen_once_that_is_changed() {
     let (mut dialog, mut finding) = (FindDialog::default(), FindSettings::default());
     finding.preparation.part_weight = 0.4;
