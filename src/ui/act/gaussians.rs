@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use strum::VariantArray;
 
-use super::export::{has_view, is_saved, scene_name};
+use super::export::{has_view, scene_name};
 use super::open::file_name;
 use crate::io::splat_format::SplatFormat;
 use crate::jobs::export;
@@ -133,9 +133,13 @@ fn save(app: &mut App, dialog: &ExportDialog) {
         let info = JobInfo::short(format!("Writing {}", file_name(&path))).phases(phases::EXPORT);
         let write = move |observer: &mut dyn Observer| {
             let views = LossViews::of_cloud(&cloud);
-            export_splat::run(&cloud, &path, Some(&views), observer)?.tell_loss(observer);
-            Ok::<_, crate::jobs::JobError>(path)
+            let written = export_splat::run(&cloud, &path, Some(&views), observer)?;
+            written.tell_loss(observer);
+            Ok::<_, crate::jobs::JobError>((path, written.drawn))
         };
-        app.start(info, write, is_saved);
+        app.start(info, write, |app, (path, drawn)| {
+            let loss = drawn.map_or_else(String::new, |drawn| format!(" ({})", drawn.line()));
+            app.state.toast(Tone::Good, format!("Saved to {}{loss}", path.display()));
+        });
     });
 }

@@ -8,13 +8,13 @@ use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable;
 
 use super::*;
-use crate::jobs::find_objects::FindSettings;
+use crate::jobs::find_objects::{FindSettings, NO_ENCODER};
 use crate::jobs::models::{ModelList, ModelState};
 use crate::jobs::workspace::OpenedPath;
 use crate::jobs::{Folders, OpenedScene, Scene};
 use crate::models::catalog;
 use crate::navigate::testing::cloud_of_wall;
-use crate::pipeline::semantics::lifting::build_map::MaskPropagation;
+use crate::pipeline::semantics::lifting::build_map::{MaskPropagation, REGIONS};
 use crate::pipeline::semantics::query::recipe::QueryConfig;
 use crate::scene::{Dataset, Preparation, SemanticMap};
 use crate::ui::actions::Action;
