@@ -5,6 +5,7 @@ use std::sync::Arc;
 use super::{edits, remote, view};
 use crate::jobs::clean::{self, MeasureRequest};
 use crate::jobs::edit::EditRequest;
+use crate::jobs::phases;
 use crate::jobs::rearrange::SplatEdit;
 use crate::jobs::select::SelectFor;
 use crate::math::format;
@@ -65,7 +66,7 @@ pub(in crate::ui) fn measure_splats(app: &mut App) {
     app.layout.show(Pane::Clean);
     let request = MeasureRequest { path: scene.stored().to_path_buf(), cloud: Arc::clone(&cloud) };
     let measure = move |observer: &mut dyn Observer| clean::measured(request, observer);
-    let info = JobInfo::long("Measuring Gaussians").pausable();
+    let info = JobInfo::long("Measuring Gaussians").pausable().phases(phases::CLEANING);
     app.clean.measuring = app.start_to_end(info, measure, |app, _, measured| {
         app.clean.measuring = false;
         if let Ok(measured) = measured {

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use crate::io::unposed::Unposed;
 use crate::jobs::demo::QUESTION;
 use crate::jobs::workspace::OpenedPath;
-use crate::jobs::{JobError, OpenedScene, presets};
+use crate::jobs::{JobError, OpenedScene, phases, presets};
 use crate::measure::{Report, is_report};
 use crate::pipeline::observer::Observer;
 use crate::ui::act::remote;
@@ -72,7 +72,8 @@ fn is_same_place(before: &OpenedScene, now: &OpenedScene) -> bool {
 
 /// Finds the camera poses of photos, and opens the result.
 pub(in crate::ui) fn find_poses(app: &mut App, photos: Box<Unposed>) {
-    let info = JobInfo::long(format!("Finding camera poses of {}", file_name(&photos.folder))).makes(Makes::Scene);
+    let title = format!("Finding camera poses of {}", file_name(&photos.folder));
+    let info = JobInfo::long(title).makes(Makes::Scene).phases(phases::POSES);
     let workspace = Arc::clone(&app.workspace);
     open_by(
         app,
@@ -100,7 +101,7 @@ pub(in crate::ui) fn demo(app: &mut App) {
 
 /// Renders the photos of the demo, opens them and trains on them.
 pub(in crate::ui) fn demo_photos(app: &mut App) {
-    let info = JobInfo::long("Rendering the demo scene").makes(Makes::Scene);
+    let info = JobInfo::long("Rendering the demo scene").makes(Makes::Scene).phases(phases::DEMO);
     let info = info.hint("The photos are rendered once; training then starts automatically.");
     let workspace = Arc::clone(&app.workspace);
     open_by(

@@ -327,9 +327,7 @@ impl AppState {
             None if scene.dataset.is_some() => {
                 "Nothing to query yet: find objects first (Ctrl+P, Find objects and parts)."
             }
-            None => {
-                "Nothing to query yet: select an object by clicks first (Ctrl+P, \u{201c}select a new object\u{201d})."
-            }
+            None => "Nothing to query yet: select an object by clicks first (Ctrl+P, New object).",
         };
         Some(why.into())
     }

@@ -89,7 +89,7 @@ fn show_unknown(ui: &mut Ui, share: Option<f64>, photo: Option<&str>, cx: &mut C
             None => "Unknown".to_owned(),
             Some(share) => format!("{} of this view is unknown", format::percent(share)),
         };
-        let why = "No mask and no photo says whose it is. Without a color: masks say that it is nobody's.";
+        let why = "No mask or photo decides which object it belongs to. Pixels without a color belong to none.";
         ui.label(RichText::new(text).small()).on_hover_text(why);
     });
     let mark = share.filter(|s| *s > 0.0).map(|_| ("Mark it\u{2026}", Action::SegmentNew(Some(NO_IDENTITY))));

@@ -7,6 +7,7 @@ use std::sync::Arc;
 use super::{edits, remote, view};
 use crate::jobs::find_objects::{self, FindRequest, FindSettings};
 use crate::jobs::models::{self, Source};
+use crate::jobs::phases;
 use crate::jobs::remove::{self as removal, RemovalOptions, RemoveRequest};
 use crate::pipeline::observer::Observer;
 use crate::scene::{Bounds, IdentityId, SemanticMap};
@@ -30,7 +31,7 @@ pub(in crate::ui) fn find(app: &mut App) {
     }
     // The user may have added files since the list was made.
     app.models = ModelsPane::default();
-    app.find_dialog.open();
+    app.find_dialog.open(&app.layout.finding);
 }
 
 pub(in crate::ui) fn choose_masks(app: &mut App) {
@@ -83,7 +84,7 @@ fn find_after(app: &mut App, mut search: PlannedSearch) {
             return;
         }
         if !is_installed {
-            let text = "Objects are not looked for: a model is missing. A download that was cut off goes on where it \
+            let text = "The search was not started: a model is missing. A download that was cut off goes on where it \
                         ended: find objects again.";
             return app.state.toast(Tone::Warning, text);
         }
@@ -136,7 +137,7 @@ pub(in crate::ui) fn segment_photo(app: &mut App) {
     };
     if app.is_editing() {
         // The search would begin with the state before the edit.
-        return app.state.toast(Tone::Warning, "Objects are being changed; segment the photo once that is done.");
+        return app.state.toast(Tone::Warning, "Objects are being changed; add from the photo once that is done.");
     }
     let scene = app.state.scene.clone();
     let Some(dataset) = scene.as_ref().and_then(|s| s.dataset.as_ref()) else {
@@ -146,7 +147,7 @@ pub(in crate::ui) fn segment_photo(app: &mut App) {
         scene.as_ref().map(|s| s.held_out(app.layout.config.holdout_every)).into_iter().flatten().collect();
     let Some(photo) = app.viewport.photo_index().or_else(|| view::nearest_photo(app, &held)) else { return };
     let seed = dataset.photos[photo].name.clone();
-    let step = FoundStep { what: format!("segmented {seed}"), adds: true };
+    let step = FoundStep { what: format!("added objects from {seed}"), adds: true };
     start_search(app, SearchScope { add: Some((known, seed)), ..SearchScope::default() }, Some(step));
 }
 
@@ -175,7 +176,7 @@ fn start_search(app: &mut App, scope: SearchScope, step: Option<FoundStep>) {
     let mut with = FindSettings { replace_all, ..app.layout.finding.clone() };
     with.seed = seed.or(with.seed);
     let title = match &known {
-        Some(_) => format!("Segmenting {}", with.seed.as_deref().unwrap_or("a photo")),
+        Some(_) => format!("Adding objects from {}", with.seed.as_deref().unwrap_or("a photo")),
         None => format!("Finding objects in {}", dataset.name),
     };
     if remote::refuses(app, &title, "run 'fmlgs preprocess' there") {
@@ -193,7 +194,8 @@ fn start_search(app: &mut App, scope: SearchScope, step: Option<FoundStep>) {
         side_px: app.state.plan.object_side_px,
         with,
     };
-    let (workspace, info) = (Arc::clone(&app.workspace), JobInfo::long(title).makes(Makes::Objects).pausable());
+    let info = JobInfo::long(title).makes(Makes::Objects).pausable().phases(phases::FINDING);
+    let workspace = Arc::clone(&app.workspace);
     let find = move |observer: &mut dyn Observer| workspace.find_objects(&request, observer);
     app.start_in_scene(info, find, move |app, found| {
         let Some(map) = found else { return };
@@ -254,8 +256,10 @@ pub(in crate::ui) fn submit_removal(app: &mut App, request: RemoveRequest) {
     if remote::refuses(app, "Removing", "run 'fmlgs remove' there") {
         return;
     }
+    let all = if request.retrain { phases::RETRAINING } else { phases::REMOVAL };
+    let info = JobInfo::long("Removing").pausable().phases(all);
     let remove = move |observer: &mut dyn Observer| removal::run_request(&request, observer);
-    app.start_in_scene(JobInfo::long("Removing").pausable(), remove, |app, removed| {
+    app.start_in_scene(info, remove, |app, removed| {
         let Some(removed) = removed else { return };
         app.state.toast(Tone::Good, removal::summary(&removed.name, &removed.report));
         app.state.say(Tone::Info, format!("Saved to {}", removed.folder.display()));

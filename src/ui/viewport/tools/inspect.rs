@@ -126,7 +126,7 @@ fn card(ui: &mut Ui, inspector: &mut Inspector, height: f32, cx: &mut Ctx<'_>) {
             });
         }
         (None, true) => {
-            ui.weak("Looking into the pixel\u{2026}");
+            ui.weak("Reading the pixel\u{2026}");
         }
         (None, false) => {
             ui.weak("No Gaussian is drawn there. Click a place in the view.");

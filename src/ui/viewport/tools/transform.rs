@@ -108,12 +108,19 @@ impl TransformTool {
         let name = all.full_name(self.arrangement.id);
         let title = format!("Move \u{201c}{name}\u{201d}: drag an arrow or type values");
         ToolCard::in_corner("arranging", title, rect).show(ui, |ui, _| {
+            // Fields are in meters where the scale is known, as lengths are elsewhere.
+            let meters = cx.state.scene.as_ref().and_then(|scene| scene.meters_per_unit());
+            let (scale, unit) = meters.map_or((1.0, "units"), |meters| (meters, "m"));
             ui.horizontal(|ui| {
                 ui.label("Move");
                 for (axis, name) in ["x", "y", "z"].into_iter().enumerate() {
-                    let field = DragValue::new(&mut self.arrangement.to.shift[axis]).speed(self.radius / 100.0);
-                    let field = ui.add(field.max_decimals(4).prefix(format!("{name} ")));
-                    field.accessible_name(format!("Move along {name}"));
+                    let shift = &mut self.arrangement.to.shift[axis];
+                    let mut shown = *shift * scale;
+                    let field = DragValue::new(&mut shown).speed(self.radius * scale / 100.0);
+                    let field = field.max_decimals(4).prefix(format!("{name} ")).suffix(format!(" {unit}"));
+                    if ui.add(field).accessible_name(format!("Move along {name}, {unit}")).changed() {
+                        *shift = shown / scale;
+                    }
                 }
             });
             ui.horizontal(|ui| {

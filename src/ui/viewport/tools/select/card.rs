@@ -159,7 +159,7 @@ fn status(tool: &SelectTool, ui: &mut Ui, scene: &ToolScene<'_>, cx: &Ctx<'_>) {
             String::new()
         }
         _ if !tool.is_prepared && tool.shape == SelectShape::Click => {
-            let text = "Preparing clicks, once for this scene";
+            let text = "Preparing selection, once for this scene";
             let bar = ProgressBar::new(scene.preparation.share(cx.state).unwrap_or(0.0)).desired_width(60.0);
             ui.add(bar.desired_height(6.0)).on_hover_text(text);
             "Preparing\u{2026}".to_owned()
