@@ -30,6 +30,18 @@ fn colored(w: &mut Window, color: [u8; 3]) -> usize {
     image.enumerate_pixels().filter(|(x, y, p)| part.contains(Pos2::new(*x as f32, *y as f32)) && is_near(p)).count()
 }
 
+/// Returns whether the window shows a text once the worker has got on.
+fn shows_soon(w: &mut Window, text: &str) -> bool {
+    for _ in 0..2_000 {
+        if w.shows(text) {
+            return true;
+        }
+        w.harness.step();
+        std::thread::sleep(std::time::Duration::from_millis(5));
+    }
+    false
+}
+
 #[test]
 fn a_mode_that_needs_a_photo_gives_the_camera_back_and_a_photo_that_was_chosen_stays() {
     let mut w = Window::new(Some(Action::Open(photos())));
@@ -65,14 +77,7 @@ fn before_a_training_a_photo_is_shown_itself() {
     w.harness.run_steps(3);
     assert!(!w.shows("there are no Gaussians yet"), "the free view");
     w.ask(Action::GoToPhoto(1));
-    for _ in 0..400 {
-        w.harness.step();
-        if w.shows("Photo: there are no Gaussians yet") {
-            break;
-        }
-        std::thread::sleep(std::time::Duration::from_millis(5));
-    }
-    assert!(w.shows("Photo: there are no Gaussians yet"));
+    assert!(shows_soon(&mut w, "Photo: there are no Gaussians yet"));
     // The control: in a trained scene it is a rendering.
     let folder = tempfile::tempdir().expect("folder");
     let mut trained = window(folder.path());
@@ -189,11 +194,8 @@ fn an_orthographic_view_says_so_and_where_it_is_from() {
     assert!(!w.shows("Orthographic"));
     w.ask(Action::LookFrom(Face::Top));
     w.press(Key::Num5);
-    w.harness.run_steps(3);
-    assert!(w.shows("Orthographic \u{b7} Top"));
-    w.until("depths", |a| a.viewport.picture().is_some_and(|p| p.full));
-    w.harness.run_steps(3);
-    assert!(w.shows("Depth from the nearest point"));
+    assert!(shows_soon(&mut w, "Orthographic \u{b7} Top"));
+    assert!(shows_soon(&mut w, "Depth from the nearest point"));
     w.click("Perspective");
     w.harness.run_steps(3);
     assert!(!w.shows("Orthographic") && !w.shows("Depth from the nearest point"), "the control");
