@@ -275,7 +275,7 @@ mod tests {
             ("video", "Export video\u{2026}"),
             ("mask", "Find objects with other masks\u{2026}"),
             ("photo", "Show the photos pane"),
-            ("delete", "Delete the selected Gaussians"),
+            ("delete", "Delete this scene\u{2026}"),
             ("view top", "Look from the top"),
         ] {
             assert_eq!(first(query), title, "{query}");
