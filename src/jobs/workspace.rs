@@ -214,7 +214,8 @@ impl Workspace {
         let known = self.known.lock().unwrap_or_else(PoisonError::into_inner).get(folder).cloned()?;
         match trained::load_info(folder) {
             Ok(info) => (info.state != known).then_some(ChangeElsewhere::Saved(info.state)),
-            Err(_) => (!trained::is_scene(folder)).then_some(ChangeElsewhere::Gone),
+            // What never had a state was no scene.
+            Err(_) => (known.is_some() && !trained::is_scene(folder)).then_some(ChangeElsewhere::Gone),
         }
     }
 

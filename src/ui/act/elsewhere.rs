@@ -21,7 +21,7 @@ pub(in crate::ui) fn watch(app: &mut App, ctx: &egui::Context) {
 /// Compares the open scene with its folder. Asks whether to open it again if another program has changed it; each
 /// change is asked about once.
 pub(in crate::ui) fn check(app: &mut App) {
-    let scene = app.state.scene.as_ref().filter(|s| s.is_stored() && s.remote.is_none());
+    let scene = app.state.scene.as_ref().filter(|s| s.remote.is_none());
     let Some(folder) = scene.filter(|_| app.state.job.is_none() && !app.is_editing()).map(|s| s.out.clone()) else {
         return;
     };

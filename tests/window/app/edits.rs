@@ -164,7 +164,7 @@ fn one_more_photo_is_segmented_and_that_is_taken_back() {
     w.ask(Action::Change(Edit::Rename(1, "crate".into())));
     w.until("the name", |a| name(a, 1) == "crate");
     w.ask(Action::SegmentPhoto);
-    w.until("one more photo", |a| said(a, "Segmented "));
+    w.until("one more photo", |a| said(a, "Added objects from "));
     assert!(said(w.app(), "were nobody's before"), "what came to be known is told");
     assert_eq!(name(w.app(), 1), "crate", "what was done by hand stays");
     w.ask(Action::Undo);
