@@ -122,6 +122,7 @@ impl WeightFile {
     }
 
     /// Reads the values of a tensor of whole numbers or truth values, row-major.
+    #[allow(dead_code, reason = "results of other methods need it")]
     pub(crate) fn integers(&mut self, name: &str) -> Result<Vec<i64>, WeightFileError> {
         let tensor = self.tensor(name)?;
         if tensor.dtype.is_float() {
