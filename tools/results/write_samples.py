@@ -2,8 +2,9 @@
 """Writes a small result of each method, in its exact format, with the arrays that a reader has to give.
 
 usage: tools/results/write_samples.py [FOLDER [METHOD...]]
+       tools/results/write_samples.py --hostile
 
-FOLDER is tests/data/results unless given. Needs PyTorch, NumPy and plyfile; see README.md beside this file.
+FOLDER is tests/data/results unless given; --hostile writes tests/corpus/torch. Needs PyTorch, NumPy and plyfile; see README.md beside this file.
 """
 
 import pathlib
@@ -12,6 +13,7 @@ import sys
 
 import numpy as np
 
+import hostile
 import identity
 import language
 import plain
@@ -22,8 +24,11 @@ MOST_BYTES, MOST_TOTAL = 60_000, 1_500_000
 
 
 def main():
-    sys.path.insert(0, str(pathlib.Path(__file__).parent))
-    default = pathlib.Path(__file__).resolve().parents[2] / "tests/data/results"
+    tests = pathlib.Path(__file__).resolve().parents[2] / "tests"
+    if sys.argv[1:] == ["--hostile"]:
+        hostile.write(tests / "corpus/torch")
+        return
+    default = tests / "data/results"
     root = pathlib.Path(sys.argv[1]) if len(sys.argv) > 1 else default
     chosen = set(sys.argv[2:])
     scene = Scene()
