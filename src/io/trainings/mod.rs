@@ -8,6 +8,8 @@ mod kind;
 mod nerfstudio;
 mod normalization;
 mod parameters;
+#[cfg(test)]
+mod sample_tests;
 mod settings;
 mod similarity;
 #[cfg(test)]

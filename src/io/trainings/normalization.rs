@@ -92,3 +92,71 @@ fn median(points: Vec<DVec3>) -> Option<DVec3> {
     };
     Some(DVec3::new(of(0), of(1), of(2)))
 }
+
+#[cfg(test)]
+mod tests {
+    use std::path::PathBuf;
+
+    use super::*;
+    use crate::scene::{Camera, Photo, SparsePoint};
+
+    /// Rows of the matrix that the formulas of gsplat give for [`made_up`], computed with NumPy.
+    const REFERENCE: [[f64; 4]; 3] = [
+        [-2.26198407e-01, -7.23824680e-04, 5.75150388e-04, 1.59478391e-03],
+        [7.23798032e-04, -2.26199138e-01, -1.14001680e-05, 8.15222642e-03],
+        [5.75183923e-04, -9.55970068e-06, 2.26199565e-01, -6.13095453e-02],
+    ];
+
+    fn made_up() -> Dataset {
+        let camera = |i: usize| {
+            let k = i as f64;
+            let (sin, cos) = (k * 0.7).sin_cos();
+            let eye = DVec3::new(4.0 * cos + 0.5, 3.5 * sin - 0.2, 1.0 + 0.3 * k);
+            let at = DVec3::new(0.3 * k.sin(), 0.2, 0.01 * k);
+            Camera::look_at(eye, at, DVec3::new(0.1, 0.05, 1.0), 0.8, 64, 48).expect("valid")
+        };
+        let photo = |i| Photo::new(format!("{i}.png"), PathBuf::new(), camera(i));
+        let position = |i: usize| {
+            let k = i as f64;
+            let height = ((i * 37) % 101) as f64 / 101.0;
+            DVec3::new(
+                2.5 * (k * 1.7).sin() + 0.4 * (k * 0.31).cos(),
+                1.4 * (k * 0.9 + 1.0).sin() + 0.2 * (k * 0.11).sin(),
+                0.9 * height * height,
+            )
+        };
+        let points = (0..600).map(|i| SparsePoint { position: position(i), rgb: [128; 3] }).collect();
+        Dataset { photos: (0..9).map(photo).collect(), points, ..Dataset::default() }
+    }
+
+    fn trained(p: DVec3) -> DVec3 {
+        DVec3::from_array(REFERENCE.map(|r| r[0] * p.x + r[1] * p.y + r[2] * p.z + r[3]))
+    }
+
+    fn cloud(dataset: &Dataset, at: impl Fn(DVec3) -> DVec3) -> GaussianCloud {
+        let positions = dataset.points.iter().map(|p| at(p.position).as_vec3().to_array()).collect();
+        GaussianCloud::isotropic(positions, -4.0, 0.0)
+    }
+
+    #[test]
+    fn the_normalization_is_that_of_gsplat_with_any_signs_of_its_axes() {
+        let dataset = made_up();
+        for signs in [[1.0, 1.0, 1.0], [1.0, -1.0, -1.0], [-1.0, 1.0, -1.0], [-1.0, -1.0, 1.0]].map(DVec3::from_array) {
+            let found = found(&dataset, &cloud(&dataset, |p| signs * trained(p))).expect("fits");
+            for p in dataset.points.iter().step_by(50).map(|p| p.position) {
+                assert!((found.of(p) - signs * trained(p)).length() < 1e-7, "{signs}: {p}");
+            }
+        }
+    }
+
+    #[test]
+    fn gaussians_of_other_photos_do_not_fit() {
+        let dataset = made_up();
+        assert_eq!(found(&dataset, &cloud(&dataset, |p| p)), None, "not normalized");
+        assert_eq!(found(&dataset, &cloud(&dataset, |p| trained(p) + DVec3::splat(0.7))), None, "elsewhere");
+        assert_eq!(found(&dataset, &GaussianCloud::default()), None, "nothing");
+        let without = Dataset { points: Vec::new(), ..dataset.clone() };
+        assert_eq!(found(&without, &cloud(&dataset, trained)), None, "without sparse points");
+        assert_eq!(found(&Dataset::default(), &cloud(&dataset, trained)), None, "without photos");
+    }
+}
