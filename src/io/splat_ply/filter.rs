@@ -55,7 +55,7 @@ mod tests {
                 assert!((f64::from(*got) - expected.ln()).abs() < 1e-6, "{i}");
             }
             let got = 1.0 / (1.0 + (-f64::from(all.opacity_logits[i])).exp());
-            assert!((got / opacity - 1.0).abs() < 1e-6, "{i}: {got} {opacity}");
+            assert!((got / opacity - 1.0).abs() < 1e-5, "{i}: {got} {opacity}");
         }
         assert_eq!((all.log_scales[2], all.opacity_logits[2]), (plain.log_scales[2], 1.0), "not a number");
         assert_eq!(all.validate(), Ok(()));

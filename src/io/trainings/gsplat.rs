@@ -3,10 +3,9 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use super::kind::not_gaussians;
-use super::parameters::{self, Constants, Names};
+use super::parameters::{self, ColorMeaning, TensorNames};
 use super::settings::YamlLines;
-use super::{Training, cameras, normalization};
+use super::{Training, cameras, normalization, not_gaussians};
 use crate::io::gs_output::GsOutput;
 use crate::io::photo_source::PhotoSource;
 use crate::io::torch::WeightFile;
@@ -129,7 +128,7 @@ fn gaussians(path: &Path) -> Result<GaussianCloud, IoError> {
         return Err(not_gaussians(path, "a checkpoint without the Gaussians of gsplat (splats.means)".into()));
     }
     let name = |tensor: &str| format!("splats.{tensor}");
-    let names = Names {
+    let names = TensorNames {
         means: name(means),
         scales: name("scales"),
         quats: name("quats"),
@@ -137,7 +136,7 @@ fn gaussians(path: &Path) -> Result<GaussianCloud, IoError> {
         constant: name("sh0"),
         rest: name("shN"),
     };
-    parameters::read(path, &mut file, &names, Constants::Harmonics)
+    parameters::read(path, &mut file, &names, ColorMeaning::Harmonics)
 }
 
 /// Lists the settings by which the pictures of the training differ from those here.

@@ -5,7 +5,7 @@
 use std::path::{Path, PathBuf};
 
 use super::Training;
-use super::parameters::{self, Constants, Names};
+use super::parameters::{self, ColorMeaning, TensorNames};
 use crate::io::gs_output::{self, GsOutput};
 use crate::io::torch::WeightFile;
 use crate::io::{IoError, files};
@@ -32,9 +32,15 @@ pub(super) fn open(path: &Path) -> Result<Training, IoError> {
     }
     let mut file = WeightFile::open(path).map_err(|e| e.of(path))?;
     let name = |index: usize| format!("0.{index}");
-    let names =
-        Names { means: name(1), constant: name(2), rest: name(3), scales: name(4), quats: name(5), opacities: name(6) };
-    let mut cloud = parameters::read(path, &mut file, &names, Constants::Harmonics)?;
+    let names = TensorNames {
+        means: name(1),
+        constant: name(2),
+        rest: name(3),
+        scales: name(4),
+        quats: name(5),
+        opacities: name(6),
+    };
+    let mut cloud = parameters::read(path, &mut file, &names, ColorMeaning::Harmonics)?;
     // Bands that the training had not turned on yet are zero, and stay so.
     if file.tree.length("0") != Some(LEAST) {
         cloud.warnings.push("the checkpoint has more than Gaussians; its further values are not shown".into());

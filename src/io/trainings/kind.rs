@@ -8,7 +8,7 @@ use crate::scene::text::shortened;
 
 /// Program that wrote a checkpoint of Gaussians.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Kind {
+pub(super) enum CheckpointKind {
     /// 3D Gaussian Splatting: a tuple, and the iteration.
     Inria,
     Gsplat,
@@ -22,17 +22,17 @@ const NAMED: usize = 6;
 ///
 /// # Errors
 /// If it cannot be read, or holds no Gaussians.
-pub(super) fn kind_of(path: &Path) -> Result<Kind, IoError> {
+pub(super) fn kind_of(path: &Path) -> Result<CheckpointKind, IoError> {
     let file = WeightFile::open(path).map_err(|e| e.of(path))?;
     let has = |name: &str| file.tensors.contains_key(name);
     if file.tree.length("0").is_some_and(|n| n >= super::inria::LEAST) && has("0.1") {
-        return Ok(Kind::Inria);
+        return Ok(CheckpointKind::Inria);
     }
     if has("splats.means") || has("splats.means3d") {
-        return Ok(Kind::Gsplat);
+        return Ok(CheckpointKind::Gsplat);
     }
     if super::nerfstudio::MODELS.iter().any(|model| has(&format!("{model}means"))) {
-        return Ok(Kind::Nerfstudio);
+        return Ok(CheckpointKind::Nerfstudio);
     }
     let starts = |start: &str| file.tensors.keys().any(|key| key.starts_with(start));
     let what = if starts("pipeline._model.field") || starts("pipeline._model.proposal") {
@@ -43,17 +43,11 @@ pub(super) fn kind_of(path: &Path) -> Result<Kind, IoError> {
         format!("a radiance field (NeRF) {which}, which has no Gaussians")
     } else {
         let keys: Vec<&str> = file.tensors.keys().take(NAMED).map(String::as_str).collect();
-        let more = file.tensors.len().saturating_sub(keys.len());
-        let keys = shortened(&keys.join(", "), 200).into_owned();
-        format!(
-            "a checkpoint without Gaussians (its tensors: {keys}{})",
-            if more > 0 { format!(" and {more} more") } else { String::new() }
-        )
+        match (shortened(&keys.join(", "), 200), file.tensors.len() - keys.len()) {
+            (keys, _) if keys.is_empty() => "a checkpoint without Gaussians and other tensors".into(),
+            (keys, 0) => format!("a checkpoint without Gaussians (its tensors: {keys})"),
+            (keys, more) => format!("a checkpoint without Gaussians (its tensors: {keys} and {more} more)"),
+        }
     };
-    Err(not_gaussians(path, what))
-}
-
-pub(super) fn not_gaussians(path: &Path, what: String) -> IoError {
-    let remedy = "open a training of 3D Gaussian Splatting, gsplat or splatfacto, or train the photos here";
-    IoError::Unsupported { path: path.into(), what, remedy }
+    Err(super::not_gaussians(path, what))
 }

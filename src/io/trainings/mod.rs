@@ -21,7 +21,7 @@ use super::gs_output::{self, GsOutput};
 use super::{IoError, files};
 use crate::scene::GaussianCloud;
 
-use kind::{Kind, kind_of};
+use kind::{CheckpointKind, kind_of};
 
 /// Gaussians of another program's training, and the cameras and photos that belong to them.
 #[derive(Debug)]
@@ -69,8 +69,14 @@ pub(crate) fn open(path: &Path) -> Result<Training, IoError> {
         };
     }
     match kind_of(path)? {
-        Kind::Inria => inria::open(path),
-        Kind::Gsplat => gsplat::open(path, Some(path)),
-        Kind::Nerfstudio => nerfstudio::open(path),
+        CheckpointKind::Inria => inria::open(path),
+        CheckpointKind::Gsplat => gsplat::open(path, Some(path)),
+        CheckpointKind::Nerfstudio => nerfstudio::open(path),
     }
+}
+
+/// Error about a checkpoint of something else.
+fn not_gaussians(path: &Path, what: String) -> IoError {
+    let remedy = "open a training of 3D Gaussian Splatting, gsplat or splatfacto, or train the photos here";
+    IoError::Unsupported { path: path.into(), what, remedy }
 }

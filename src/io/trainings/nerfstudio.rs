@@ -8,11 +8,10 @@ use std::path::{Path, PathBuf};
 use glam::{DMat3, DVec3};
 use serde::Deserialize;
 
-use super::kind::not_gaussians;
-use super::parameters::{self, Constants, Names};
+use super::parameters::{self, ColorMeaning, TensorNames};
 use super::settings::YamlLines;
 use super::similarity::Similarity;
-use super::{Training, cameras};
+use super::{Training, cameras, not_gaussians};
 use crate::io::gs_output::GsOutput;
 use crate::io::photo_list::straightened;
 use crate::io::photo_source::PhotoSource;
@@ -49,8 +48,9 @@ pub(super) fn run_of(path: &Path) -> Option<PathBuf> {
         for folder in level {
             let names = files::names_in(&folder).unwrap_or_default();
             let below = names.iter().map(|name| folder.join(name)).filter(|p| p.is_dir() && !p.is_symlink());
+            let before = next.len();
             next.extend(below.take(MOST - seen));
-            seen = (seen + next.len()).min(MOST);
+            seen += next.len() - before;
         }
         // Runs are named by their time.
         if let Some(run) = next.iter().filter(|p| is_run(p)).max_by_key(|p| p.file_name().map(|n| n.to_owned())) {
@@ -84,7 +84,7 @@ pub(super) fn open(path: &Path) -> Result<Training, IoError> {
         return Err(not_gaussians(&file, format!("a radiance field or a model of '{method}' without Gaussians")));
     };
     let name = |tensor: &str| format!("{model}{tensor}");
-    let names = Names {
+    let names = TensorNames {
         means: name("means"),
         scales: name("scales"),
         quats: name("quats"),
@@ -92,7 +92,7 @@ pub(super) fn open(path: &Path) -> Result<Training, IoError> {
         constant: name("features_dc"),
         rest: name("features_rest"),
     };
-    let mut cloud = parameters::read(&file, &mut weights, &names, Constants::Logits)?;
+    let mut cloud = parameters::read(&file, &mut weights, &names, ColorMeaning::Logits)?;
     if config.value("rasterize_mode") == Some("antialiased") {
         cloud.render_mode = SplatRenderMode::Mip;
     }
@@ -141,7 +141,8 @@ fn held_out(config: &YamlLines, all: usize) -> Vec<bool> {
             let mut held = vec![true; all];
             // As many as are trained on, evenly from the first to the last.
             let step = if trained > 1 { (all - 1) as f64 / (trained - 1) as f64 } else { 0.0 };
-            (0..trained).for_each(|k| held[((k as f64 * step) as usize).min(all - 1)] = false);
+            let of = |k: usize| if k + 1 == trained { all - 1 } else { (k as f64 * step) as usize };
+            (0..trained).for_each(|k| held[if trained > 1 { of(k) } else { 0 }] = false);
             held
         }
         _ => vec![false; all],
@@ -155,7 +156,7 @@ struct Trained {
     scale: f64,
 }
 
-/// What was applied to the poses of a `transforms.json` when it was made.
+/// Change of the poses of a `transforms.json` when it was made.
 #[derive(Default, Deserialize)]
 struct Applied {
     applied_transform: Option<Vec<[f64; 4]>>,

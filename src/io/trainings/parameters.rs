@@ -13,8 +13,8 @@ use crate::scene::{GaussianCloud, SplatRenderMode};
 /// Rows of a tensor in memory at once.
 const ROWS: usize = 1 << 15;
 
-/// Names of the tensors of Gaussians in a checkpoint.
-pub(super) struct Names {
+/// TensorNames of the tensors of Gaussians in a checkpoint.
+pub(super) struct TensorNames {
     pub(super) means: String,
     pub(super) scales: String,
     pub(super) quats: String,
@@ -27,7 +27,7 @@ pub(super) struct Names {
 
 /// Meaning of the constant harmonics of a training without higher ones.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Constants {
+pub(super) enum ColorMeaning {
     Harmonics,
     /// Logits of colors.
     Logits,
@@ -40,14 +40,18 @@ pub(super) enum Constants {
 pub(super) fn read(
     path: &Path,
     file: &mut WeightFile,
-    names: &Names,
-    constants: Constants,
+    names: &TensorNames,
+    constants: ColorMeaning,
 ) -> Result<GaussianCloud, IoError> {
     let cloud = gather(file, names, constants).map_err(|e| e.of(path))?;
     finite_only(cloud, path)
 }
 
-fn gather(file: &mut WeightFile, names: &Names, constants: Constants) -> Result<GaussianCloud, WeightFileError> {
+fn gather(
+    file: &mut WeightFile,
+    names: &TensorNames,
+    constants: ColorMeaning,
+) -> Result<GaussianCloud, WeightFileError> {
     let n = rows(file, &names.means)?;
     let degree = degree(file, n, &names.rest)?;
     let mut cloud = GaussianCloud { sh_degree: degree, ..GaussianCloud::default() };
@@ -66,7 +70,7 @@ fn gather(file: &mut WeightFile, names: &Names, constants: Constants) -> Result<
     let stride = coefficients(degree);
     let mut sh = Vec::new();
     let of = |v: f32| match constants {
-        Constants::Logits if degree == 0 => constant(v.sigmoid()),
+        ColorMeaning::Logits if degree == 0 => constant(v.sigmoid()),
         _ => v,
     };
     columns(file, &names.constant, (n, 3), &mut |v| {
