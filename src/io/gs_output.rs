@@ -85,6 +85,8 @@ pub(crate) fn beside(splat: &Path) -> Option<GsOutput> {
     let all = std::iter::once(folder).chain(above.and_then(Path::parent));
     let folder = all.into_iter().find(|f| f.join(CAMERAS).is_file() || f.join(SETTINGS).is_file())?;
     let mut found = GsOutput::of(folder);
+    // Every splat of such a training is called like every other.
+    found.name = (Some(folder) == above.and_then(Path::parent)).then(|| files::folder_name(folder));
     let mut is_split = false;
     let settings = folder.join(SETTINGS);
     if let Some(text) = settings.is_file().then(|| files::read_text(&settings)) {

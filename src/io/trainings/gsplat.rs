@@ -83,7 +83,7 @@ pub(super) fn open(path: &Path, file: Option<&Path>) -> Result<Training, IoError
     if config.value("model_type").is_some_and(|model| model.starts_with("2dgs")) {
         cloud.render_mode = SplatRenderMode::Surfels;
     }
-    let mut beside = GsOutput::of(&run);
+    let mut beside = GsOutput { name: Some(files::folder_name(&run)), ..GsOutput::of(&run) };
     beside.warnings.extend(differences(&config));
     let others = all.values().map(BTreeMap::len).max().unwrap_or_default();
     if others > ranks.len() && (named.is_some() || file.is_none()) {

@@ -45,5 +45,7 @@ pub(super) fn open(path: &Path) -> Result<Training, IoError> {
     if file.tree.length("0") != Some(LEAST) {
         cloud.warnings.push("the checkpoint has more than Gaussians; its further values are not shown".into());
     }
-    Ok(Training { cloud, beside: beside.unwrap_or_else(|| GsOutput::of(files::folder_of(path))) })
+    let mut beside = beside.unwrap_or_else(|| GsOutput::of(files::folder_of(path)));
+    beside.name = Some(files::folder_name(&beside.folder));
+    Ok(Training { cloud, beside })
 }

@@ -17,7 +17,7 @@ use crate::io::photo_list::straightened;
 use crate::io::photo_source::PhotoSource;
 use crate::io::torch::WeightFile;
 use crate::io::{IoError, files, transforms};
-use crate::scene::{GaussianCloud, SplatRenderMode};
+use crate::scene::{GaussianCloud, SplatRenderMode, text};
 
 const CONFIG: &str = "config.yml";
 const MODELS_FOLDER: &str = "nerfstudio_models";
@@ -97,7 +97,8 @@ pub(super) fn open(path: &Path) -> Result<Training, IoError> {
         cloud.render_mode = SplatRenderMode::Mip;
     }
     let mut beside = GsOutput::of(folder);
-    beside.name = config.value("experiment_name").map(str::to_owned);
+    let data = || Some(text::name(&config.path("data")?.file_name()?.to_string_lossy()));
+    beside.name = config.value("experiment_name").map(text::name).or_else(data);
     beside.white_background = config.value("background_color") == Some("white");
     beside.source = config.path("data").map(|stated| PhotoSource::find(&stated, folder));
     let photos = beside.source.as_ref().and_then(|s| s.found.clone());
