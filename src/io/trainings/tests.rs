@@ -291,3 +291,53 @@ fn no_cut_and_no_changed_byte_makes_it_fail_otherwise_than_by_an_error() {
     fs::write(&file, b"\x80\x02cposix\nsystem\n").expect("written");
     assert!(io::open(&file).expect_err("old").to_string().contains("older PyTorch"));
 }
+
+#[test]
+fn photos_fit_the_gaussians_of_splatfacto_and_are_found_from_its_settings() {
+    let (_guard, root) = folder();
+    let (run, data) = (root.join("outputs/garden/splatfacto/2026-01-02_030405"), root.join("data/garden"));
+    fs::create_dir_all(data.join("images")).expect("made");
+    let frame = |(i, center): (usize, [f64; 3])| {
+        image::RgbImage::new(64, 48).save(data.join(format!("images/{i}.png"))).expect("saved");
+        let [x, y, z] = center;
+        let pose = [[1.0, 0.0, 0.0, x], [0.0, 1.0, 0.0, y], [0.0, 0.0, 1.0, z], [0.0, 0.0, 0.0, 1.0]];
+        serde_json::json!({ "file_path": format!("images/{i}.png"), "transform_matrix": pose })
+    };
+    let centers = [[0.0, 0.0, 0.0], [0.1, 0.0, 0.0], [0.0, 0.1, 0.0]];
+    let frames: Vec<_> = centers.into_iter().enumerate().map(frame).collect();
+    let list = serde_json::json!({ "fl_x": 50.0, "w": 64, "h": 48, "frames": frames });
+    fs::write(data.join("transforms.json"), list.to_string()).expect("written");
+    put(&run.join("nerfstudio_models/step-000029999.ckpt"), &splatfacto(4, 3));
+    let config = "data: !!python/object/apply:pathlib.PosixPath\n- data\n- garden\nmethod_name: splatfacto\n";
+    fs::write(run.join("config.yml"), config).expect("written");
+    let transform = r#"{"transform": [[0, -1, 0, 1], [1, 0, 0, 0], [0, 0, 1, 5]], "scale": 2}"#;
+    fs::write(run.join("dataparser_transforms.json"), transform).expect("written");
+    let scene = crate::jobs::open::scene(&run).expect("opens");
+    assert_eq!((scene.dataset_path.as_ref(), &*scene.name), (Some(&data), "garden"));
+    assert!(scene.warnings.is_empty(), "{:?}", scene.warnings);
+    let held_out: Vec<bool> = scene.cameras.iter().map(|c| c.held_out).collect();
+    assert_eq!(held_out, [false; 3], "ceil(0.9 * 3) are trained on");
+    // The first Gaussian at half its stored place, moved and turned back; seen from the world's origin along -z.
+    let q = glam::DVec3::new(1.0, 1.0 + 1.0 / 64.0, 1.0 + 2.0 / 64.0) / 2.0 - glam::DVec3::new(1.0, 0.0, 5.0);
+    let p = glam::DVec3::new(q.y, -q.x, q.z);
+    let expected = glam::DVec2::new(32.0 + 50.0 * p.x / -p.z, 24.0 - 50.0 * p.y / -p.z);
+    let seen = |scene: &crate::jobs::Scene| {
+        let first = &scene.cameras[0];
+        assert_eq!(first.name, "images/0.png");
+        first.camera.project(scene.cloud.world_position(0))
+    };
+    assert!((seen(&scene).expect("in front") - expected).length() < 1e-4);
+    // Without the file, nothing fits, and that is told.
+    fs::remove_file(run.join("dataparser_transforms.json")).expect("removed");
+    let other = crate::jobs::open::scene(&run).expect("opens");
+    assert!(seen(&other).is_none_or(|seen| (seen - expected).length() > 1.0), "the control");
+    assert!(other.warnings.concat().contains("may not fit"), "{:?}", other.warnings);
+    // Photos that were moved are found beside the training by their name, and missing ones are told.
+    fs::rename(&data, root.join("outputs/garden/garden")).expect("moved");
+    let moved = crate::jobs::open::scene(&run).expect("opens");
+    assert_eq!(moved.dataset_path, Some(root.join("outputs/garden/garden")));
+    fs::remove_dir_all(root.join("outputs/garden/garden")).expect("removed");
+    let gone = crate::jobs::open::scene(&run).expect("opens");
+    assert!(gone.cameras.is_empty() && gone.dataset_path.is_none());
+    assert!(gone.warnings.concat().contains("data/garden, which is not here"), "{:?}", gone.warnings);
+}
