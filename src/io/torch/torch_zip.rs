@@ -28,6 +28,7 @@ type Result<T> = std::result::Result<T, WeightFileError>;
 
 /// Opens the archive and reads its list of tensors.
 pub(super) fn open(file: File) -> Result<(Archive, BTreeMap<String, StoredTensor>, TorchTree)> {
+    let length = file.metadata()?.len();
     let mut archive = ZipArchive::new(BufReader::new(file))?;
     let names = archive.file_names().map(|n| Ok(n?.into_owned())).collect::<Result<Vec<String>>>()?;
     // The folder is named after the file as it was first saved.
@@ -44,7 +45,7 @@ pub(super) fn open(file: File) -> Result<(Archive, BTreeMap<String, StoredTensor
     let tree = pickle::read(&entry(&mut archive, index, MOST_PICKLE)?)?;
     let mut tensors = BTreeMap::new();
     for (name, record) in records(&tree)? {
-        let tensor = stored(&mut archive, root, &name, record)?;
+        let tensor = stored(&mut archive, root, length, &name, record)?;
         if tensors.insert(name.clone(), tensor).is_some() {
             return Err(WeightFileError::Tensor { name, problem: "is there twice".into() });
         }
@@ -112,7 +113,8 @@ fn entry(archive: &mut Archive, index: usize, most: u64) -> Result<Vec<u8>> {
     Ok(bytes)
 }
 
-fn stored(archive: &mut Archive, root: &str, name: &str, record: TensorRecord) -> Result<StoredTensor> {
+/// Finds the storage of a tensor in an archive of `length` bytes.
+fn stored(archive: &mut Archive, root: &str, length: u64, name: &str, record: TensorRecord) -> Result<StoredTensor> {
     let failed = |problem: String| WeightFileError::Tensor { name: name.into(), problem };
     let key = &*record.storage;
     if key.is_empty() || !key.bytes().all(|b| b.is_ascii_alphanumeric()) {
@@ -122,6 +124,9 @@ fn stored(archive: &mut Archive, root: &str, name: &str, record: TensorRecord) -
     let index = archive.index_for_name(&path);
     let index = index.ok_or_else(|| failed(format!("is stored in '{path}', which is not in the archive")))?;
     let size = archive.by_index_raw(index)?.size();
+    if size > length {
+        return Err(failed(format!("is stored in '{path}', which states {size} bytes in a file of {length}")));
+    }
     if record.elements.checked_mul(record.dtype.bytes()).is_none_or(|bytes| bytes as u64 != size) {
         let (elements, bytes) = (record.elements, record.dtype.bytes());
         return Err(failed(format!("states {elements} numbers of {bytes} bytes, but '{path}' has {size} bytes")));

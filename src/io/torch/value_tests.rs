@@ -126,3 +126,19 @@ fn what_is_not_asked_for_is_not_read_and_what_repeats_is_refused() {
     }
     assert_eq!(file.floats("0").expect("sound"), [1.0]);
 }
+
+#[test]
+fn a_storage_is_never_larger_than_its_file() {
+    let of = |claimed| saved(&Saved::dict([("t", Saved::Claimed(claimed, vec![0.5; 4]))]));
+    assert!(read(&of(4)).is_ok());
+    // Pickle and directory agree on 4 MiB that are not there.
+    let mut lying = of(1 << 20);
+    let entries: Vec<usize> = (0..lying.len() - 4).filter(|i| lying[*i..].starts_with(b"PK\x01\x02")).collect();
+    assert_eq!(entries.len(), 4);
+    for field in [20, 24] {
+        lying[entries[2] + field..][..4].copy_from_slice(&(4_u32 << 20).to_le_bytes());
+    }
+    let error = read(&lying).err().expect("refused").to_string();
+    assert!(error.contains("in a file of") || error.contains("archive is broken"), "{error}");
+    assert!(read(&of(1 << 20)).err().expect("refused").to_string().contains("has 16 bytes"));
+}

@@ -20,6 +20,8 @@ pub(crate) enum Saved {
     Dict(Vec<(String, Saved)>),
     Tensor(Vec<usize>, Vec<f32>),
     Whole(Vec<usize>, Vec<i64>),
+    /// Tensor of so many numbers, and those that are stored for it.
+    Claimed(usize, Vec<f32>),
     /// Tensor with a storage that is not in the file.
     Missing,
     /// Opcodes.
@@ -135,6 +137,10 @@ fn put(value: &Saved, out: &mut Vec<u8>, storages: &mut Vec<Vec<u8>>) {
         }
         Saved::Whole(shape, values) => {
             out.extend(tensor("Long", &storages.len().to_string(), shape, values.len()));
+            storages.push(values.iter().flat_map(|v| v.to_le_bytes()).collect());
+        }
+        Saved::Claimed(n, values) => {
+            out.extend(tensor("Float", &storages.len().to_string(), &[*n], *n));
             storages.push(values.iter().flat_map(|v| v.to_le_bytes()).collect());
         }
         Saved::Missing => out.extend(tensor("Float", "9999", &[1], 1)),
