@@ -29,6 +29,7 @@ pub(crate) mod measurements;
 pub(crate) mod memory;
 mod morton;
 pub mod npy;
+pub(crate) mod npy_numbers;
 mod open;
 pub(crate) mod page;
 pub mod photo;
