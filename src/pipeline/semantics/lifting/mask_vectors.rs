@@ -1,7 +1,7 @@
 //! Language features of identities from vectors that came with the masks, without a network: the mean of the vectors of
 //! the masks that show an identity.
 
-use std::collections::HashMap;
+use std::collections::{BTreeMap, HashMap};
 
 use super::embed::{CropRenderer, LEAST_PX};
 use super::error::FindError;
@@ -20,7 +20,7 @@ use crate::scene::{GaussianCloud, Identities, IdentityId, LanguageFeatures, Leve
 const SIDE_PX: u32 = 512;
 /// Most photos whose masks are read.
 const MOST_PHOTOS: usize = 128;
-/// Least IoU of a mask and an identity that it shows.
+/// Least IoU of a mask and the identity that it shows.
 const SHOWS: f64 = 0.5;
 
 /// Embeds every identity of `map` that `encoder` has not embedded yet, by the masks of the `photos`. Parts keep
@@ -75,28 +75,67 @@ pub(super) fn embed_by_masks(
     Ok(LanguageFeatures { encoder: encoder.to_owned(), dimension, by_identity: of })
 }
 
-/// Finds the masks that show an identity in a view: the identity, the number of the mask, and the pixels they share.
+/// Finds the identity that each mask fits best in a view, if it shows just this: the identity, the number of the mask,
+/// and the pixels they share.
 fn shown(view: &ViewMap, levels: &[Vec<u16>], identities: &Identities) -> Vec<(IdentityId, u16, usize)> {
     let mut seen = vec![0_usize; identities.len() + 1];
     view.identity.iter().for_each(|id| identities.ancestors(*id).for_each(|id| seen[id as usize] += 1));
     let mut found = Vec::new();
     for level in levels {
         let mut area: HashMap<u16, usize> = HashMap::new();
-        let mut innermost: HashMap<(IdentityId, u16), usize> = HashMap::new();
+        let mut innermost: HashMap<(u16, IdentityId), usize> = HashMap::new();
         for (&id, &mask) in view.identity.iter().zip(level).filter(|(_, mask)| **mask != NO_MASK) {
             *area.entry(mask).or_default() += 1;
-            *innermost.entry((id, mask)).or_default() += 1;
+            *innermost.entry((mask, id)).or_default() += 1;
         }
-        let mut shared: HashMap<(IdentityId, u16), usize> = HashMap::new();
-        for ((id, mask), pixels) in innermost {
-            identities.ancestors(id).for_each(|id| *shared.entry((id, mask)).or_default() += pixels);
+        // In one order: sums depend on it, and so does the choice among equals.
+        let mut shared: BTreeMap<(u16, IdentityId), usize> = BTreeMap::new();
+        for ((mask, id), pixels) in innermost {
+            identities.ancestors(id).for_each(|id| *shared.entry((mask, id)).or_default() += pixels);
         }
-        found.extend(shared.into_iter().filter_map(|((id, mask), pixels)| {
+        let mut best: BTreeMap<u16, (f64, IdentityId, usize)> = BTreeMap::new();
+        for ((mask, id), pixels) in shared {
             let iou = pixels as f64 / (area[&mask] + seen[id as usize] - pixels) as f64;
-            (pixels >= LEAST_PX && iou >= SHOWS).then_some((id, mask, pixels))
-        }));
+            let fits = pixels >= LEAST_PX && iou >= SHOWS;
+            if fits && best.get(&mask).is_none_or(|(most, ..)| iou > *most) {
+                best.insert(mask, (iou, id, pixels));
+            }
+        }
+        found.extend(best.into_iter().map(|(mask, (_, id, pixels))| (id, mask, pixels)));
     }
-    // In one order: sums depend on it.
-    found.sort_unstable();
     found
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::NO_IDENTITY;
+
+    #[test]
+    fn a_mask_counts_for_the_identity_that_it_fits_best() {
+        let mut all = Identities::default();
+        let pot = all.add(Level::Object, NO_IDENTITY, vec![]);
+        let lid = all.add(Level::Part, pot, vec![]);
+        let identity = (0..100)
+            .map(|i| {
+                if i < 20 {
+                    pot
+                } else if i < 45 {
+                    lid
+                } else {
+                    NO_IDENTITY
+                }
+            })
+            .collect();
+        let view = ViewMap::certain(100, identity);
+        let level = |masks: &[(u16, std::ops::Range<usize>)]| {
+            let mut level = vec![NO_MASK; 100];
+            masks.iter().for_each(|(number, range)| level[range.clone()].fill(*number));
+            level
+        };
+        // The whole pot fits its lid by half, too; a mask of the table and one of a few pixels show neither.
+        let levels = [level(&[(0, 22..45), (1, 60..70)]), level(&[(2, 0..45), (3, 45..100)]), level(&[(4, 0..100)])];
+        assert_eq!(shown(&view, &levels, &all), [(lid, 0, 23), (pot, 2, 45)]);
+        assert_eq!(shown(&view, &[level(&[(5, 20..31)])], &all), [], "11 pixels are too few");
+    }
 }
