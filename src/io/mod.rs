@@ -58,6 +58,8 @@ pub mod spz;
 pub(crate) mod temporary;
 #[cfg(test)]
 mod test_clouds;
+#[allow(dead_code)]
+pub(crate) mod torch;
 pub mod trained;
 pub mod transforms;
 pub(crate) mod unposed;
