@@ -32,7 +32,9 @@ pub(super) fn read(runs: &LevelRuns, options: &ResultOptions, dim: usize) -> Res
     let decoder = Decoder::new(dim, steps, &file)?;
     match decoder.split() {
         (_, Some(_)) => Ok(decoder),
-        _ => Err(IoError::syntax(&file, "decoder", "no tensors 'decoder.<n>.weight'; it is no autoencoder of LangSplat")),
+        _ => {
+            Err(IoError::syntax(&file, "decoder", "no tensors 'decoder.<n>.weight'; it is no autoencoder of LangSplat"))
+        }
     }
 }
 

@@ -42,7 +42,8 @@ impl LinearLayer {
         let fits = |n: usize| (1..=MOST_NUMBERS).contains(&n);
         if !fits(inputs) || !fits(outputs) || weight.len() != inputs * outputs || bias.len() != outputs {
             let (weights, biases) = (weight.len(), bias.len());
-            let reason = format!("a layer from {inputs} to {outputs} numbers has {weights} weights and {biases} biases");
+            let reason =
+                format!("a layer from {inputs} to {outputs} numbers has {weights} weights and {biases} biases");
             return Err(IoError::syntax(path, "decoder", reason));
         }
         Ok(Self { inputs, outputs, weight, bias })
@@ -51,7 +52,8 @@ impl LinearLayer {
     /// Creates the layer that blends the rows of a codebook `[inputs, outputs]`.
     pub(crate) fn of_codebook([entries, dim]: [usize; 2], book: &[f32], path: &Path) -> Result<Self, IoError> {
         let whole = entries.checked_mul(dim) == Some(book.len());
-        let turned = if whole { (0..dim).flat_map(|d| (0..entries).map(move |k| book[k * dim + d])).collect() } else { vec![] };
+        let turned =
+            if whole { (0..dim).flat_map(|d| (0..entries).map(move |k| book[k * dim + d])).collect() } else { vec![] };
         Self::new([dim, entries], turned, None, path)
     }
 
@@ -130,7 +132,8 @@ mod tests {
     #[test]
     fn layers_fit_one_another_or_are_refused() {
         let path = Path::new("x.pth");
-        let layer = |shape: [usize; 2]| LinearLayer::new(shape, vec![1.0; shape[0] * shape[1]], None, path).expect("fits");
+        let layer =
+            |shape: [usize; 2]| LinearLayer::new(shape, vec![1.0; shape[0] * shape[1]], None, path).expect("fits");
         let two = |a, b| vec![DecoderStep::Linear(layer(a)), DecoderStep::Relu, DecoderStep::Linear(layer(b))];
         let decoder = Decoder::new(3, two([4, 3], [5, 4]), path).expect("fits");
         assert_eq!((decoder.inputs(), decoder.outputs(), decoder.split().0.len()), (3, 5, 2));

@@ -84,7 +84,9 @@ fn parse(bytes: &[u8], path: &Path) -> Result<PqIndex, IoError> {
     let code_size = r.u64("the size of a code")?;
     let (inner, pieces, bits) = (r.u64("the dimension")?, r.u64("the pieces")?, r.u64("the bits")?);
     if by_residual != [1] || bits != 8 || inner != dim as u64 || code_size != pieces {
-        return Err(bad(format!("codes of {pieces} pieces of {bits} bits without or with residuals ({by_residual:?})")));
+        return Err(bad(format!(
+            "codes of {pieces} pieces of {bits} bits without or with residuals ({by_residual:?})"
+        )));
     }
     let pieces = pieces as usize;
     let books = floats(&mut r, "centroids of pieces")?;

@@ -34,12 +34,16 @@ pub(super) fn read(splat: &Path, options: &ResultOptions) -> Result<MethodResult
                 let remedy = "open its Gaussians alone; with --speedup, put decoder_chkpnt<n>.pth beside them";
                 return Err(unsupported("features of SAM, with which no phrase can be compared", remedy));
             }
-            let what = format!("features of {dim} numbers with a decoder (decoder_chkpnt<n>.pth in the folder of the run)");
+            let what =
+                format!("features of {dim} numbers with a decoder (decoder_chkpnt<n>.pth in the folder of the run)");
             decoder(&folder::helper(options.decoder.as_deref(), found, splat, &what)?, dim)?
         }
     };
     if decoder.outputs() != LSEG {
-        let what = format!("features of {} numbers, with which no phrase can be compared (LSeg's have 512)", decoder.outputs());
+        let what = format!(
+            "features of {} numbers, with which no phrase can be compared (LSeg's have 512)",
+            decoder.outputs()
+        );
         return Err(unsupported(&what, "open its Gaussians alone"));
     }
     let codes = LevelCodes::Dense(features);

@@ -51,7 +51,8 @@ fn is_called(path: &Path, start: &str) -> bool {
 /// Names in these folders that `is` accepts, with the number that it reads in them; the highest counts.
 pub(super) fn highest(folders: &[&Path], number: impl Fn(&str) -> Option<u64>) -> Option<PathBuf> {
     let all = folders.iter().filter_map(|f| Some((f, files::names_in(f).ok()?)));
-    let known = all.flat_map(|(f, names)| names.into_iter().filter_map(|n| Some((number(&n)?, f.join(n)))).collect::<Vec<_>>());
+    let known =
+        all.flat_map(|(f, names)| names.into_iter().filter_map(|n| Some((number(&n)?, f.join(n)))).collect::<Vec<_>>());
     known.filter(|(_, path)| path.is_file()).max().map(|(_, path)| path)
 }
 
@@ -64,7 +65,12 @@ pub(super) fn number_in(name: &str, before: &str, after: &str) -> Option<u64> {
 ///
 /// # Errors
 /// If there is none; `what` says what it is and where it is looked for.
-pub(super) fn helper(named: Option<&Path>, found: Option<PathBuf>, result: &Path, what: &str) -> Result<PathBuf, IoError> {
+pub(super) fn helper(
+    named: Option<&Path>,
+    found: Option<PathBuf>,
+    result: &Path,
+    what: &str,
+) -> Result<PathBuf, IoError> {
     let named = named.map(Path::to_owned);
     named.or(found).ok_or_else(|| IoError::Unsupported {
         path: result.into(),
@@ -83,7 +89,8 @@ mod tests {
         for n in ["iteration_900", "iteration_7000", "iteration_30000", "other"] {
             let folder = run.path().join(CLOUDS).join(n);
             std::fs::create_dir_all(&folder).expect("create");
-            std::fs::write(folder.join(if n == "iteration_30000" { "scene.ply" } else { "a.ply" }), "x").expect("write");
+            std::fs::write(folder.join(if n == "iteration_30000" { "scene.ply" } else { "a.ply" }), "x")
+                .expect("write");
         }
         let found = latest(run.path(), "a.ply").expect("found");
         assert!(found.ends_with("iteration_7000/a.ply"), "{found:?}");

@@ -118,7 +118,8 @@ fn weights(tensors: &mut Tensors<'_>, file: &Path, options: &ResultOptions) -> R
         return Err(tensors.error(CODEBOOK, reason));
     }
     let weights = SparseRows::largest_shares(entries, &logits.to_vec(), options.top_k);
-    let weights = weights.ok_or_else(|| tensors.error(FEATURES, format!("has no {} weights to keep", options.top_k)))?;
+    let weights =
+        weights.ok_or_else(|| tensors.error(FEATURES, format!("has no {} weights to keep", options.top_k)))?;
     let book = LinearLayer::of_codebook([entries, dim], &tensors.floats(CODEBOOK)?, file)?;
     let decoder = Decoder::new(entries, vec![DecoderStep::Linear(book)], file)?;
     Ok(EmbeddedLevel { codes: LevelCodes::Sparse(weights), is_unit: false, decoder })

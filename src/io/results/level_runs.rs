@@ -42,7 +42,11 @@ pub(super) fn find(path: &Path) -> Result<Option<LevelRuns>, IoError> {
     if let (Some((scene, _)), Some(parent)) = (level_of(&name), folder.parent())
         && last_checkpoint(&folder).is_some()
     {
-        let found = beside(parent).remove(scene).map(|levels| LevelRuns { scene: scene.into(), folder: folder.clone(), levels });
+        let found = beside(parent).remove(scene).map(|levels| LevelRuns {
+            scene: scene.into(),
+            folder: folder.clone(),
+            levels,
+        });
         return Ok(found);
     }
     if let Some(checkpoint) = last_checkpoint(&folder) {
@@ -53,7 +57,11 @@ pub(super) fn find(path: &Path) -> Result<Option<LevelRuns>, IoError> {
     if scenes.len() > 1 {
         let names: Vec<String> = scenes.into_keys().collect();
         let what = format!("results of several scenes ({})", names.join(", "));
-        return Err(IoError::Unsupported { path: path.into(), what, remedy: "open the folder of a level of one of them" });
+        return Err(IoError::Unsupported {
+            path: path.into(),
+            what,
+            remedy: "open the folder of a level of one of them",
+        });
     }
     Ok(scenes.pop_first().map(|(scene, levels)| LevelRuns { scene, folder, levels }))
 }
@@ -110,7 +118,10 @@ mod tests {
         let names = |runs: &LevelRuns| runs.levels.iter().map(|l| l.name.clone()).collect::<Vec<_>>();
         for place in ["", "ramen_1", "ramen_3", "ramen_2/chkpnt7000.pth"] {
             let found = find(&parent.path().join(place)).expect("one scene").expect("levels");
-            assert_eq!((found.scene.as_str(), names(&found)), ("ramen", ["small", "medium", "large"].map(str::to_owned).to_vec()));
+            assert_eq!(
+                (found.scene.as_str(), names(&found)),
+                ("ramen", ["small", "medium", "large"].map(str::to_owned).to_vec())
+            );
             assert!(found.levels[1].checkpoint.ends_with("ramen_2/chkpnt30000.pth"), "{found:?}");
         }
         file("figurines_1/chkpnt30000.pth");

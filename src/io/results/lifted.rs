@@ -24,7 +24,10 @@ pub(super) fn ludvig(file: &Path) -> Result<MethodResult, IoError> {
     let splat = files::folder_of(file).join(GAUSSIANS);
     let features = numpy::read(file)?.rows(file, "features")?;
     if features.dim() != CLIP {
-        let what = format!("features of {} numbers, with which no phrase can be compared (CLIP's have {CLIP})", features.dim());
+        let what = format!(
+            "features of {} numbers, with which no phrase can be compared (CLIP's have {CLIP})",
+            features.dim()
+        );
         return Err(IoError::Unsupported { path: file.into(), what, remedy: "open its Gaussians alone" });
     }
     assembled(Method::Ludvig, &splat, splat_ply::read(&splat)?, features)
@@ -36,7 +39,10 @@ pub(super) fn distilled(file: &Path) -> Result<MethodResult, IoError> {
     let name = tensors.names().next().unwrap_or_default().to_owned();
     let features = tensors.half_rows(&name)?;
     if features.dim() != CLIP {
-        let what = format!("features of {} numbers, with which no phrase can be compared (CLIP's have {CLIP})", features.dim());
+        let what = format!(
+            "features of {} numbers, with which no phrase can be compared (CLIP's have {CLIP})",
+            features.dim()
+        );
         return Err(IoError::Unsupported { path: file.into(), what, remedy: "distill SAMOpenCLIP's features" });
     }
     let splat = splat_of(file).ok_or_else(|| IoError::Unsupported {

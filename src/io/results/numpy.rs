@@ -38,15 +38,18 @@ fn parse(mut bytes: Vec<u8>) -> Result<NumpyArray, String> {
     let size = kind.get(1..).and_then(|s| s.parse::<usize>().ok()).filter(|n| matches!(n, 1 | 2 | 4 | 8));
     let known = matches!(kind.get(..1), Some("f" | "i" | "u" | "b")) && matches!(order, "<" | "|" | "=");
     let Some(size) = size.filter(|_| known) else {
-        let reason = format!("its numbers are of the kind '{descr}'; save it as little-endian numbers, not as Python objects");
+        let reason =
+            format!("its numbers are of the kind '{descr}'; save it as little-endian numbers, not as Python objects");
         return Err(reason);
     };
     if !text.contains("'fortran_order': False") {
         return Err("the array is stored column by column; save it with order='C'".into());
     }
-    let entries = text.split_once("'shape'").and_then(|(_, rest)| rest.split_once('(')?.1.split_once(')').map(|(s, _)| s));
+    let entries =
+        text.split_once("'shape'").and_then(|(_, rest)| rest.split_once('(')?.1.split_once(')').map(|(s, _)| s));
     let entries = entries.ok_or("the header has no shape")?.split(',').map(str::trim).filter(|e| !e.is_empty());
-    let shape: Vec<usize> = entries.map(|e| e.parse().map_err(|_| format!("'{e}' in its shape is no number"))).collect::<Result<_, _>>()?;
+    let shape: Vec<usize> =
+        entries.map(|e| e.parse().map_err(|_| format!("'{e}' in its shape is no number"))).collect::<Result<_, _>>()?;
     let claimed = shape.iter().try_fold(size, |n, length| n.checked_mul(*length));
     let present = bytes.len() - header;
     if claimed != Some(present) {
@@ -124,7 +127,10 @@ impl<'a> NumpyArchive<'a> {
     pub(super) fn array(&mut self, name: &str) -> Result<NumpyArray, IoError> {
         let path = self.path;
         let bad = |reason: String| IoError::syntax(path, format!("array '{name}'"), reason);
-        let entry = self.zip.by_name(&format!("{name}.npy")).map_err(|e| bad(e.to_string()))?;
+        // A name that was given with its ending has it twice.
+        let named = [format!("{name}.npy"), format!("{name}.npy.npy")];
+        let index = named.iter().find_map(|n| self.zip.index_for_name(n)).ok_or_else(|| bad("is not there".into()))?;
+        let entry = self.zip.by_index(index).map_err(|e| bad(e.to_string()))?;
         let limit = memory::budget();
         let mut bytes = Vec::new();
         // The size that the archive states may be wrong, so the reading itself is bounded.

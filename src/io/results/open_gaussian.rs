@@ -1,4 +1,5 @@
-//! OpenGaussian: `point_cloud.ply` with `ins_feat_*`, and `cluster_lang.npz` in the folder of the run.
+//! OpenGaussian: `point_cloud.ply` with `ins_feat_*` and codebooks beside it, and `cluster_lang.npz` in the folder of the
+//! run.
 
 use std::path::Path;
 
@@ -7,7 +8,7 @@ use super::folder::{self, ResultOptions};
 use super::numpy::{NumpyArchive, NumpyArray};
 use super::rows::{self, FeatureRows};
 use super::tensors::Tensors;
-use crate::io::{IoError, splat_ply};
+use crate::io::{IoError, files, splat_ply};
 
 /// First of the properties.
 pub(super) const PROPERTY: &str = "ins_feat_r";
@@ -35,8 +36,9 @@ pub(super) fn read(splat: &Path, options: &ResultOptions) -> Result<MethodResult
         let (claimed, possible) = (seen.len() as u64, features.len() as u64);
         return Err(IoError::Count { path: file, what: "values of 'occu_count'".into(), claimed, possible });
     }
-    let codes = codes(&run.join("leaf_code_book"), features.len())?;
-    let roots = codes_of(&run.join("root_code_book"))?.map_or(USUAL_ROOTS, |r| r.len());
+    let book = |name: &str| book(&[files::folder_of(splat), run.as_path()], name);
+    let codes = book("leaf_code_book")?.filter(|codes| codes.len() == features.len());
+    let roots = book("root_code_book")?.map_or(USUAL_ROOTS, |r| r.len());
     let in_root = features.len() / roots.max(1);
     let leaves = (in_root > 0 && in_root * roots == features.len()).then_some(Leaves { in_root, codes });
     let dim = features.dim();
@@ -53,7 +55,8 @@ pub(super) fn read(splat: &Path, options: &ResultOptions) -> Result<MethodResult
 
 /// Cluster of each Gaussian.
 fn numbers(array: &NumpyArray, clusters: usize, file: &Path) -> Result<Vec<Option<u32>>, IoError> {
-    let all = array.integers().ok_or_else(|| IoError::syntax(file, "leaf_ind", "fractions instead of whole numbers"))?;
+    let all =
+        array.integers().ok_or_else(|| IoError::syntax(file, "leaf_ind", "fractions instead of whole numbers"))?;
     clusters_of(&all, clusters).map_err(|reason| IoError::syntax(file, "leaf_ind", reason))
 }
 
@@ -66,15 +69,8 @@ pub(super) fn clusters_of(numbers: &[i64], clusters: usize) -> Result<Vec<Option
     }
 }
 
-/// Instance features of the small clusters, if their codebook is there.
-fn codes(folder: &Path, clusters: usize) -> Result<Option<FeatureRows>, IoError> {
-    Ok(codes_of(folder)?.filter(|codes| codes.len() == clusters))
-}
-
-fn codes_of(folder: &Path) -> Result<Option<FeatureRows>, IoError> {
-    let file = folder.join("kmeans_centers.pth");
-    if !file.is_file() {
-        return Ok(None);
-    }
-    Tensors::open(&file)?.rows("ins_feat").map(Some)
+/// Centers of a codebook, if it is in one of these folders.
+fn book(folders: &[&Path], name: &str) -> Result<Option<FeatureRows>, IoError> {
+    let file = folders.iter().map(|f| f.join(name).join("kmeans_centers.pth")).find(|file| file.is_file());
+    file.map(|file| Tensors::open(&file)?.rows("ins_feat")).transpose()
 }

@@ -131,7 +131,13 @@ fn gathered(columns: Vec<Vec<f32>>, rows: usize, path: &Path, what: &str) -> Res
     let limit = memory::budget();
     if bytes > limit {
         let remedy = "free some memory";
-        return Err(IoError::OverBudget { path: path.into(), what: "turning its columns into rows", bytes, limit, remedy });
+        return Err(IoError::OverBudget {
+            path: path.into(),
+            what: "turning its columns into rows",
+            bytes,
+            limit,
+            remedy,
+        });
     }
     let mut values = vec![0.0; rows * dim];
     for (c, column) in columns.into_iter().enumerate() {

@@ -86,7 +86,9 @@ impl<'a> Tensors<'a> {
             return Err(self.error(&weight, format!("has the shape {shape:?}, expected [outputs, inputs]")));
         };
         if rest.iter().any(|n| *n != 1) {
-            return Err(self.error(&weight, format!("has the shape {shape:?}; only convolutions of one pixel are read")));
+            return Err(
+                self.error(&weight, format!("has the shape {shape:?}; only convolutions of one pixel are read"))
+            );
         }
         let (values, bias) = (self.floats(&weight)?, self.floats(&bias)?);
         LinearLayer::new([*outputs, *inputs], values, Some(bias), self.path)
@@ -105,7 +107,8 @@ impl<'a> Tensors<'a> {
         let n = positions.len();
         let rest = self.shape("0.3").and_then(|s| s.get(1).copied()).unwrap_or(0);
         let degree = (0..=3_u8).find(|d| crate::math::sh::coefficients(*d) == rest + 1);
-        let sh_degree = degree.ok_or_else(|| self.error("0.3", format!("has {rest} harmonics, expected 0, 3, 8 or 15")))?;
+        let sh_degree =
+            degree.ok_or_else(|| self.error("0.3", format!("has {rest} harmonics, expected 0, 3, 8 or 15")))?;
         let expected = [("0.1", 3), ("0.2", 3), ("0.3", 3 * rest), ("0.4", 3), ("0.5", 4), ("0.6", 1)];
         for (name, each) in expected {
             let have: usize = self.shape(name).map_or(0, |s| s.iter().product());
@@ -115,7 +118,8 @@ impl<'a> Tensors<'a> {
         }
         let constant = fixed::<3>(&self.floats("0.2")?);
         let higher = if rest == 0 { Vec::new() } else { fixed::<3>(&self.floats("0.3")?) };
-        let sh = (0..n).flat_map(|i| std::iter::once(constant[i]).chain(higher[i * rest..(i + 1) * rest].iter().copied()));
+        let sh =
+            (0..n).flat_map(|i| std::iter::once(constant[i]).chain(higher[i * rest..(i + 1) * rest].iter().copied()));
         let sh = sh.collect();
         let cloud = GaussianCloud {
             positions,
