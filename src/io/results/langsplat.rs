@@ -10,6 +10,7 @@ use super::face::{EmbeddedLevel, LevelCodes, LevelValues, Method, MethodResult, 
 use super::faiss;
 use super::folder::ResultOptions;
 use super::level_runs::LevelRuns;
+use super::product::COARSE_BYTES;
 use super::sparse::SparseRows;
 use super::tensors::Tensors;
 use crate::io::IoError;
@@ -33,10 +34,15 @@ fn method(tensors: &Tensors<'_>, file: &Path) -> Result<Method, IoError> {
         (Some(14), Some([_, _])) if tensors.shape(CODEBOOK).is_some_and(|s| s.len() == 3) => Ok(Method::LangSplatV2),
         (Some(13), Some([_, 3])) if is_float => Ok(Method::LangSplat),
         (Some(13), Some([_, CLIP])) if is_float => Ok(Method::OccamsLgs),
-        (Some(13), Some([_, 130])) if !is_float => Ok(Method::DrSplat),
+        (Some(13), Some([_, bytes])) if !is_float && *bytes > COARSE_BYTES => Ok(Method::DrSplat),
         (Some(13), _) if tensors.shape("0.12").is_some_and(|s| s.len() == 3) => Err(IoError::Unsupported {
             path: file.into(),
             what: "a checkpoint of Feature 3DGS".into(),
+            remedy: "open the folder of the run, whose point_cloud.ply has the same features",
+        }),
+        (Some(14), Some([_, 1])) => Err(IoError::Unsupported {
+            path: file.into(),
+            what: "a checkpoint of LEGaussians".into(),
             remedy: "open the folder of the run, whose point_cloud.ply has the same features",
         }),
         (Some(12), _) => Err(IoError::Unsupported {
@@ -131,5 +137,5 @@ fn product(tensors: &mut Tensors<'_>, file: &Path, options: &ResultOptions) -> R
     let index = faiss::beside(file, options)?;
     let codes = LevelCodes::Product(index.codes(bytes)?);
     let decoder = Decoder::none(codes.dim());
-    Ok(EmbeddedLevel { codes, is_unit: false, decoder })
+    Ok(EmbeddedLevel { codes, is_unit: true, decoder })
 }

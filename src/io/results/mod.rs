@@ -25,6 +25,9 @@ mod sparse;
 mod tensors;
 mod thgs;
 
+#[cfg(test)]
+pub(crate) mod tests;
+
 pub use decoder::{Decoder, DecoderStep, LinearLayer};
 pub use face::{
     CLIP_B32, Classifier, ClusterLevel, EmbeddedLevel, Leaves, LevelCodes, LevelValues, Method, MethodResult,

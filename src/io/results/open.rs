@@ -77,10 +77,13 @@ fn features_of_saga(path: &Path) -> Option<PathBuf> {
 
 /// The splat that a path means.
 fn splat_of(path: &Path) -> Option<PathBuf> {
-    if path.is_dir() {
-        return folder::latest(path, "point_cloud.ply");
+    const SPLAT: &str = "point_cloud.ply";
+    let is_splat = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("ply"));
+    match path.is_dir() {
+        true => folder::latest(path, SPLAT),
+        false if is_splat => Some(path.to_owned()),
+        false => folder::latest(files::folder_of(path), SPLAT),
     }
-    path.extension().is_some_and(|e| e.eq_ignore_ascii_case("ply")).then(|| path.to_owned())
 }
 
 /// The reader of a splat with these properties.

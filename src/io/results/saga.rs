@@ -14,10 +14,16 @@ use crate::io::{IoError, files, memory, splat_ply};
 pub(super) const FEATURES: &str = "contrastive_feature_point_cloud.ply";
 /// Start of the properties' names.
 const PREFIX: &str = "f_";
+/// File of LaGa, which has features like SAGA's.
+const LAGAS: &str = "multi_lvl_cluster_features.pth";
 const GATE: &str = "scale_gate.pt";
 
 /// Reads a result; `file` has the features.
 pub(super) fn read(file: &Path) -> Result<MethodResult, IoError> {
+    if files::folder_of(file).join(LAGAS).is_file() {
+        let what = "LaGa's descriptors of clusters".into();
+        return Err(IoError::Unsupported { path: file.into(), what, remedy: "open scene_point_cloud.ply alone" });
+    }
     let features = features(file)?;
     let splat = splat_of(file).ok_or_else(|| IoError::Unsupported {
         path: file.into(),

@@ -13,6 +13,8 @@ use crate::pipeline::semantics::relevancy::{nearest, score};
 use crate::render::{LabelWinner, RenderSettings, Renderer};
 use crate::scene::Camera;
 
+/// Relevancy of what is alike to nothing, as the methods compute it.
+const UNDECIDED: f32 = 0.5;
 /// Numbers of an embedding over which its blend is not kept.
 const WIDE: usize = 128;
 
@@ -138,7 +140,7 @@ impl ForeignScene {
             let one = |c: &Option<u32>| c.map_or(0.0, |c| relevancy[c as usize]);
             return Ok(clusters.of.par_iter().map(one).collect());
         }
-        Ok(relevancy_of(&self.gaussian_cosines(level, &all_of(phrase))?, phrase.temperature))
+        Ok(relevancy_of(&self.gaussian_cosines(level, &all_of(phrase))?, phrase.temperature, 0.0))
     }
 
     /// Relevancy of each cluster; 0 for those without an embedding.
@@ -149,13 +151,7 @@ impl ForeignScene {
     ) -> Result<Vec<f32>, ForeignError> {
         let all = all_of(phrase);
         self.fits(clusters.features.dim(), &all)?;
-        let mut relevancy = relevancy_of(&cluster_cosines(clusters, &all), phrase.temperature);
-        for (k, relevancy) in relevancy.iter_mut().enumerate() {
-            if clusters.features.row(k).iter().all(|v| *v == 0.0) {
-                *relevancy = 0.0;
-            }
-        }
-        Ok(relevancy)
+        Ok(relevancy_of(&cluster_cosines(clusters, &all), phrase.temperature, 0.0))
     }
 
     /// Cosines of each pixel of a view with each phrase, by the blended codes of a level.
@@ -180,13 +176,40 @@ impl ForeignScene {
         }
     }
 
-    /// Relevancy of each pixel of a view, 0 to 1: of its blended embedding, or of the cluster of largest weight.
+    /// Relevancy of each pixel of a view, 0 to 1: of its blended embedding, or of the cluster of largest weight. It is 0
+    /// where nothing is.
     pub fn pixel_relevancy(
         &self,
         renderer: &mut Renderer,
         view: &ForeignView,
         level: usize,
         phrase: ForeignPhrase<'_>,
+    ) -> Result<Vec<f32>, ForeignError> {
+        let mut relevancy = self.relevancy_everywhere(renderer, view, level, phrase, 0.0)?;
+        if let Some(blended) = view.blended(level) {
+            relevancy.iter_mut().zip(&blended.alpha).filter(|(_, a)| **a == 0.0).for_each(|(r, _)| *r = 0.0);
+        }
+        Ok(relevancy)
+    }
+
+    /// As [`Self::pixel_relevancy`], with the relevancy that the methods compute where nothing is.
+    pub(crate) fn relevancy_of_method(
+        &self,
+        renderer: &mut Renderer,
+        view: &ForeignView,
+        level: usize,
+        phrase: ForeignPhrase<'_>,
+    ) -> Result<Vec<f32>, ForeignError> {
+        self.relevancy_everywhere(renderer, view, level, phrase, UNDECIDED)
+    }
+
+    fn relevancy_everywhere(
+        &self,
+        renderer: &mut Renderer,
+        view: &ForeignView,
+        level: usize,
+        phrase: ForeignPhrase<'_>,
+        of_nothing: f32,
     ) -> Result<Vec<f32>, ForeignError> {
         if let (LevelValues::Clusters(clusters), Some(LevelView::Winners(winners))) =
             (&self.level(level)?.values, view.levels.get(level))
@@ -196,7 +219,7 @@ impl ForeignScene {
             return Ok(winners.iter().map(|w| of(w).unwrap_or(0.0)).collect());
         }
         let cosines = self.pixel_cosines(renderer, view, level, &all_of(phrase))?;
-        Ok(relevancy_of(&cosines, phrase.temperature))
+        Ok(relevancy_of(&cosines, phrase.temperature, of_nothing))
     }
 }
 
@@ -205,10 +228,14 @@ fn all_of<'a>(phrase: ForeignPhrase<'a>) -> Vec<&'a [f32]> {
     std::iter::once(phrase.query).chain(phrase.canonical.iter().map(Vec::as_slice)).collect()
 }
 
-/// Relevancy from the cosines with the phrase, and those with the canonical phrases.
-fn relevancy_of(cosines: &[Vec<f32>], temperature: f32) -> Vec<f32> {
+/// Relevancy from the cosines with the phrase, and those with the canonical phrases. What has no direction, and so
+/// cosines of 0 with all, gets `of_nothing`.
+fn relevancy_of(cosines: &[Vec<f32>], temperature: f32, of_nothing: f32) -> Vec<f32> {
     let Some((query, canonical)) = cosines.split_first() else { return Vec::new() };
-    let one = |i: usize| score(query[i] - nearest(canonical.iter().map(|c| c[i])), temperature);
+    let one = |i: usize| match cosines.iter().all(|c| c[i] == 0.0) {
+        true => of_nothing,
+        false => score(query[i] - nearest(canonical.iter().map(|c| c[i])), temperature),
+    };
     (0..query.len()).into_par_iter().with_min_len(1 << 12).map(one).collect()
 }
 

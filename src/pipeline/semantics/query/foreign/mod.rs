@@ -18,6 +18,9 @@ pub(crate) mod cosines;
 pub mod identities;
 pub mod own_rules;
 
+#[cfg(test)]
+mod tests;
+
 use crate::render::{DrawError, RenderError};
 
 /// A phrase as other methods compare it.

@@ -46,7 +46,7 @@ impl ForeignScene {
             Method::LangSplat | Method::LangSplatV2 | Method::OccamsLgs => {
                 let mut best: Option<(f32, usize, Vec<f32>)> = None;
                 for level in 0..self.result.levels.len() {
-                    let relevancy = self.pixel_relevancy(renderer, view, level, phrase)?;
+                    let relevancy = self.relevancy_of_method(renderer, view, level, phrase)?;
                     let v = smoothed(&relevancy, w, h).1;
                     let most = largest(&v);
                     if best.as_ref().is_none_or(|(before, ..)| most > *before) {
@@ -59,12 +59,12 @@ impl ForeignScene {
             }
             Method::LeGaussians => {
                 let phrase = ForeignPhrase { temperature: LEGAUSSIANS_TEMPERATURE, ..phrase };
-                let relevancy = self.pixel_relevancy(renderer, view, 0, phrase)?;
+                let relevancy = self.relevancy_of_method(renderer, view, 0, phrase)?;
                 let rule = "relevancy of 0.5 or more";
                 Ok(ForeignMask { mask: threshold(&relevancy, |r| r >= 0.5), level: 0, rule })
             }
             Method::Feature3dgs => {
-                let relevancy = self.pixel_relevancy(renderer, view, 0, phrase)?;
+                let relevancy = self.relevancy_of_method(renderer, view, 0, phrase)?;
                 let rule = "more alike to the phrase than to any canonical phrase";
                 Ok(ForeignMask { mask: threshold(&relevancy, |r| r > 0.5), level: 0, rule })
             }
@@ -123,24 +123,29 @@ impl ForeignScene {
         query: &[f32],
         levels: std::ops::Range<usize>,
     ) -> Result<Mask, ForeignError> {
-        let mut all: Vec<(f32, usize, usize)> = Vec::new();
-        for level in levels {
-            let LevelValues::Clusters(clusters) = &self.result.levels[level].values else { continue };
-            let cosines = cluster_cosines(clusters, &[query]).swap_remove(0);
-            all.extend(cosines.into_iter().enumerate().map(|(k, cosine)| (cosine, level, k)));
-        }
-        all.sort_by(|a, b| b.0.total_cmp(&a.0));
-        all.truncate(SEGMENTS);
-        let is_in = |i: usize| {
-            all.iter().any(|(_, level, k)| match &self.result.levels[*level].values {
-                LevelValues::Clusters(clusters) => clusters.of[i] == Some(*k as u32),
-                _ => false,
-            })
-        };
-        let copy = |i: usize, _: usize, out: &mut [f32]| out.fill(f32::from(u8::from(is_in(i))));
+        let members = self.members(query, levels);
+        let copy = |i: usize, _: usize, out: &mut [f32]| out.fill(f32::from(u8::from(members[i])));
         let blended = blend::blend(renderer, &self.result.cloud, BlendSource { dim: 1, copy: &copy }, &view.camera)?;
         let (w, h) = view.size();
         Ok(Mask::from_fn(w, h, |i| blended.planes[0][i] > MEMBERSHIP))
+    }
+
+    /// Returns for each Gaussian whether it is in one of the segments of these levels that are most alike to a phrase.
+    pub(crate) fn members(&self, query: &[f32], levels: std::ops::Range<usize>) -> Vec<bool> {
+        let clusters = levels.filter_map(|level| match &self.result.levels[level].values {
+            LevelValues::Clusters(clusters) => Some(clusters),
+            _ => None,
+        });
+        let clusters: Vec<&ClusterLevel> = clusters.collect();
+        let mut all: Vec<(f32, usize, u32)> = Vec::new();
+        for (level, clusters) in clusters.iter().enumerate() {
+            let cosines = cluster_cosines(clusters, &[query]).swap_remove(0);
+            all.extend((0..).zip(cosines).map(|(k, cosine)| (cosine, level, k)));
+        }
+        all.sort_by(|a, b| b.0.total_cmp(&a.0));
+        all.truncate(SEGMENTS);
+        let is_in = |i: usize| all.iter().any(|(_, level, k)| clusters[*level].of[i] == Some(*k));
+        (0..self.result.cloud.len()).map(is_in).collect()
     }
 }
 
