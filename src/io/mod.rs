@@ -42,6 +42,7 @@ mod reader;
 mod removed;
 mod render_mode;
 mod resample;
+pub mod results;
 pub(crate) mod scene_copy;
 pub(crate) mod scene_files;
 pub(crate) mod scene_folder;
@@ -58,6 +59,8 @@ pub mod spz;
 pub(crate) mod temporary;
 #[cfg(test)]
 mod test_clouds;
+#[allow(dead_code)]
+pub(crate) mod torch;
 pub mod trained;
 pub mod transforms;
 pub(crate) mod unposed;

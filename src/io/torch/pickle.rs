@@ -2,10 +2,12 @@
 //! unlisted name is an error that contains it.
 
 use std::collections::HashMap;
-use std::rc::Rc;
+use std::sync::Arc;
 
 use super::WeightFileError;
+use super::numpy;
 use super::parts::{Global, PickleNode, Storage, TensorRecord, Value};
+use super::tree::TorchTree;
 
 /// Most objects of a pickle; official files have some thousands.
 const MOST_OBJECTS: usize = 1 << 20;
@@ -14,19 +16,12 @@ const MOST_AXES: usize = 8;
 
 type Result<T> = std::result::Result<T, WeightFileError>;
 
-/// Parsed pickle.
-#[derive(Debug)]
-pub(super) struct Pickle {
-    pub(super) nodes: Vec<PickleNode>,
-    pub(super) root: Value,
-}
-
 /// Reads a pickle.
-pub(super) fn read(bytes: &[u8]) -> Result<Pickle> {
+pub(super) fn read(bytes: &[u8]) -> Result<TorchTree> {
     let mut machine =
         Machine { bytes, at: 0, stack: Vec::new(), marks: Vec::new(), memo: HashMap::new(), nodes: Vec::new() };
     let root = machine.run()?;
-    Ok(Pickle { nodes: machine.nodes, root })
+    Ok(TorchTree { nodes: machine.nodes, root })
 }
 
 struct Machine<'a> {
@@ -49,8 +44,8 @@ impl Machine<'_> {
                 0x95 => drop(self.take::<8>()?),
                 b'.' => return self.pop(),
                 b'(' => self.marks.push(self.stack.len()),
-                // Tensors need no booleans and floats: they are read as nothing.
-                b'N' | 0x88 | 0x89 => self.push(Value::Nothing)?,
+                b'N' => self.push(Value::Nothing)?,
+                0x88 | 0x89 => self.push(Value::Bool(opcode == 0x88))?,
                 b'J' => self.integer::<4>()?,
                 b'K' => self.integer::<1>()?,
                 b'M' => self.integer::<2>()?,
@@ -59,8 +54,18 @@ impl Machine<'_> {
                     [n] => self.long(usize::from(n))?,
                 },
                 b'G' => {
-                    self.take::<8>()?;
-                    self.push(Value::Nothing)?;
+                    let value = f64::from_be_bytes(self.take()?);
+                    self.push(Value::Float(value))?;
+                }
+                b'C' => {
+                    let [length] = self.take()?;
+                    let bytes = Arc::from(self.slice(usize::from(length))?);
+                    self.push(Value::Bytes(bytes))?;
+                }
+                b'B' => {
+                    let length = u32::from_le_bytes(self.take()?);
+                    let bytes = Arc::from(self.slice(length as usize)?);
+                    self.push(Value::Bytes(bytes))?;
                 }
                 b'X' | b'T' => {
                     let length = u32::from_le_bytes(self.take()?);
@@ -177,7 +182,7 @@ impl Machine<'_> {
     }
 
     fn text(&mut self, length: usize) -> Result<()> {
-        let text = std::str::from_utf8(self.slice(length)?).map(Rc::from);
+        let text = std::str::from_utf8(self.slice(length)?).map(Arc::from);
         let text = text.map_err(|_| self.malformed("a text that is not UTF-8"))?;
         self.push(Value::Text(text))
     }
@@ -316,6 +321,25 @@ impl Machine<'_> {
                     tensor.ok_or_else(|| self.malformed("a tensor without storage or shape"))?,
                 ))
             }
+            Global::Setting => self.push(Value::Nothing),
+            Global::NumpyArray => self.node(PickleNode::NumpyArray),
+            Global::NumpyDtype => match self.items(&arguments).first() {
+                Some(Value::Text(code)) => {
+                    let code = code.clone();
+                    self.node(PickleNode::NumpyDtype(code))
+                }
+                _ => Err(self.malformed("a type of NumPy without name")),
+            },
+            Global::NumpyScalar => {
+                let number = match self.items(&arguments) {
+                    [dtype, bytes] => match self.of(dtype) {
+                        Some(PickleNode::NumpyDtype(code)) => numpy::number(code, bytes),
+                        _ => None,
+                    },
+                    _ => None,
+                };
+                self.push(number.ok_or_else(|| self.malformed("a number of NumPy without type or of another size"))?)
+            }
             _ => Err(self.malformed("a call of what is no function")),
         }
     }
@@ -344,10 +368,15 @@ impl Machine<'_> {
 
     fn build(&mut self) -> Result<()> {
         let state = self.pop()?;
+        // The order of bytes: `(version, order, ...)`.
+        let order = self.items(&state).get(1);
+        let is_turned = matches!(order, Some(Value::Text(order)) if &**order == ">");
         match self.top()? {
             PickleNode::Module(attributes) => *attributes = Some(state),
             // A dictionary of tensors may have attributes: versions of modules.
-            PickleNode::Dict(_) => {}
+            PickleNode::Dict(_) | PickleNode::NumpyArray => {}
+            PickleNode::NumpyDtype(_) if is_turned => return Err(self.malformed("numbers that are not little-endian")),
+            PickleNode::NumpyDtype(_) => {}
             _ => return Err(self.malformed("attributes of what has none")),
         }
         Ok(())

@@ -2,13 +2,16 @@
 
 use std::collections::BTreeMap;
 use std::fs::File;
-use std::io::{BufReader, Read};
+use std::io::{self, BufReader, Read};
 
+use zip::read::ZipFile;
 use zip::{CompressionMethod, ZipArchive};
 
+use super::WeightFileError;
 use super::parts::{PickleNode, TensorRecord, Value};
-use super::pickle::{self, Pickle};
-use super::{Place, StoredTensor, WeightFileError};
+use super::pickle;
+use super::tensor::{Place, StoredTensor};
+use super::tree::TorchTree;
 
 /// Largest pickle, bytes; those of official files have about 100 kB.
 const MOST_PICKLE: u64 = 8 << 20;
@@ -24,7 +27,7 @@ type Archive = ZipArchive<BufReader<File>>;
 type Result<T> = std::result::Result<T, WeightFileError>;
 
 /// Opens the archive and reads its list of tensors.
-pub(super) fn open(file: File) -> Result<(Archive, BTreeMap<String, StoredTensor>)> {
+pub(super) fn open(file: File) -> Result<(Archive, BTreeMap<String, StoredTensor>, TorchTree)> {
     let mut archive = ZipArchive::new(BufReader::new(file))?;
     let names = archive.file_names().map(|n| Ok(n?.into_owned())).collect::<Result<Vec<String>>>()?;
     // The folder is named after the file as it was first saved.
@@ -38,15 +41,15 @@ pub(super) fn open(file: File) -> Result<(Archive, BTreeMap<String, StoredTensor
         return Err(WeightFileError::Entry { entry: format!("{root}byteorder"), problem });
     }
     let index = archive.index_for_name(pickled).ok_or(WeightFileError::Kind)?;
-    let pickle = pickle::read(&entry(&mut archive, index, MOST_PICKLE)?)?;
+    let tree = pickle::read(&entry(&mut archive, index, MOST_PICKLE)?)?;
     let mut tensors = BTreeMap::new();
-    for (name, record) in records(&pickle)? {
+    for (name, record) in records(&tree)? {
         let tensor = stored(&mut archive, root, &name, record)?;
         if tensors.insert(name.clone(), tensor).is_some() {
             return Err(WeightFileError::Tensor { name, problem: "is there twice".into() });
         }
     }
-    Ok((archive, tensors))
+    Ok((archive, tensors, tree))
 }
 
 /// Reads the bytes of a storage and verifies their checksum.
@@ -57,18 +60,48 @@ pub(super) fn storage(archive: &mut Archive, place: Place) -> Result<Vec<u8>> {
     }
 }
 
-/// Reads an entry of at most `most` bytes. PyTorch does not compress such entries, so none is larger than its file.
-fn entry(archive: &mut Archive, index: usize, most: u64) -> Result<Vec<u8>> {
-    let mut file = archive.by_index(index)?;
+/// Reads parts of these lengths of a storage, one after the other from the byte `begin`, and verifies its checksum.
+pub(super) fn parts(
+    archive: &mut Archive,
+    place: Place,
+    begin: usize,
+    lengths: impl Iterator<Item = usize>,
+    each: &mut dyn FnMut(&[u8]),
+) -> Result<()> {
+    let Place::Entry(index) = place else { return Ok(()) };
+    let (mut file, name) = stored_entry(archive, index, u64::MAX)?;
+    let failed = |e: io::Error| WeightFileError::Entry { entry: name.clone(), problem: format!("is damaged: {e}") };
+    io::copy(&mut (&mut file).take(begin as u64), &mut io::sink()).map_err(failed)?;
+    let mut part = Vec::new();
+    for length in lengths {
+        part.resize(length, 0);
+        file.read_exact(&mut part).map_err(failed)?;
+        each(&part);
+    }
+    // Its checksum is verified at its end.
+    io::copy(&mut file, &mut io::sink()).map_err(failed).map(drop)
+}
+
+/// Opens an entry of at most `most` bytes. PyTorch does not compress such entries, so none is larger than its file.
+fn stored_entry(archive: &mut Archive, index: usize, most: u64) -> Result<(ZipFile<'_, BufReader<File>>, String)> {
+    let file = archive.by_index(index)?;
     let entry = file.name().map(|n| n.into_owned()).unwrap_or_default();
+    let size = file.size();
+    let problem = if file.compression() != CompressionMethod::Stored || file.compressed_size() != size {
+        "is compressed, as PyTorch does not do it; save the checkpoint anew there".into()
+    } else if size > most {
+        format!("has {size} bytes, more than the {most} that are possible")
+    } else {
+        return Ok((file, entry));
+    };
+    Err(WeightFileError::Entry { entry, problem })
+}
+
+/// Reads an entry of at most `most` bytes.
+fn entry(archive: &mut Archive, index: usize, most: u64) -> Result<Vec<u8>> {
+    let (mut file, entry) = stored_entry(archive, index, most)?;
     let refused = |problem: String| WeightFileError::Entry { entry: entry.clone(), problem };
     let size = file.size();
-    if file.compression() != CompressionMethod::Stored || file.compressed_size() != size {
-        return Err(refused("is compressed, as PyTorch does not do it; save the checkpoint anew there".into()));
-    }
-    if size > most {
-        return Err(refused(format!("has {size} bytes, more than the {most} that are possible")));
-    }
     let mut bytes = Vec::new();
     (&mut file).take(size).read_to_end(&mut bytes).map_err(|e| refused(format!("cannot be read: {e}")))?;
     // One more read at the end verifies the checksum.
@@ -98,9 +131,9 @@ fn stored(archive: &mut Archive, root: &str, name: &str, record: TensorRecord) -
 }
 
 /// Lists all tensors of a pickle by their path of keys, joined by dots.
-fn records(pickle: &Pickle) -> Result<Vec<(String, TensorRecord)>> {
+fn records(tree: &TorchTree) -> Result<Vec<(String, TensorRecord)>> {
     let mut found = Vec::new();
-    let mut open = vec![(String::new(), pickle.root.clone(), 0)];
+    let mut open = vec![(String::new(), tree.root.clone(), 0)];
     let mut visits = 0;
     // Limits on depth and visits, because a small pickle can describe a cyclic or a huge graph.
     while let Some((name, value, depth)) = open.pop() {
@@ -120,7 +153,7 @@ fn records(pickle: &Pickle) -> Result<Vec<(String, TensorRecord)>> {
             open.push((name, value.clone(), depth + 1));
             Ok(())
         };
-        match &pickle.nodes[node] {
+        match &tree.nodes[node] {
             PickleNode::Tensor(record) if found.len() < MOST_TENSORS => found.push((name, record.clone())),
             PickleNode::Tensor(_) => return Err(WeightFileError::TooMany { what: "tensors", most: MOST_TENSORS }),
             PickleNode::Module(Some(attributes)) => open.push((name, attributes.clone(), depth + 1)),
@@ -138,7 +171,11 @@ fn records(pickle: &Pickle) -> Result<Vec<(String, TensorRecord)>> {
                     below(&i.to_string(), item)?;
                 }
             }
-            PickleNode::Global(_) | PickleNode::Storage(_) | PickleNode::Module(None) => {}
+            PickleNode::Global(_)
+            | PickleNode::Storage(_)
+            | PickleNode::Module(None)
+            | PickleNode::NumpyDtype(_)
+            | PickleNode::NumpyArray => {}
         }
     }
     Ok(found)

@@ -16,7 +16,7 @@ fn open(bytes: &[u8]) -> Result<WeightFile, WeightFileError> {
     let mut file = tempfile::tempfile().expect("a file");
     file.write_all(bytes).expect("written");
     file.seek(SeekFrom::Start(0)).expect("turned back");
-    WeightFile::of(file)
+    WeightFile::read(file)
 }
 
 /// Returns `n` numbers; the k-th is k / 8.

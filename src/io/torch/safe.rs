@@ -6,7 +6,8 @@ use std::io::{Read, Seek, SeekFrom};
 
 use safetensors::tensor::Metadata;
 
-use super::{Dtype, Place, StoredTensor, WeightFileError};
+use super::WeightFileError;
+use super::tensor::{Dtype, Place, StoredTensor};
 
 /// Largest header, bytes; those of official files have about 100 kB.
 const MOST_HEADER: u64 = 16 << 20;
@@ -39,6 +40,7 @@ pub(super) fn open(file: &mut File) -> Result<BTreeMap<String, StoredTensor>> {
             Safe::F32 => Dtype::F32,
             Safe::F16 => Dtype::F16,
             Safe::BF16 => Dtype::Bf16,
+            Safe::U8 | Safe::BOOL => Dtype::Byte,
             other => Dtype::Whole((other.bitsize() / 8).max(1)),
         };
         let failed = |problem: String| WeightFileError::Tensor { name: name.clone(), problem };
