@@ -29,7 +29,6 @@ pub(crate) mod measurements;
 pub(crate) mod memory;
 mod morton;
 pub mod npy;
-pub(crate) mod npy_numbers;
 mod open;
 pub(crate) mod page;
 pub mod photo;

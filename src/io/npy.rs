@@ -29,7 +29,7 @@ pub fn open<'a>(bytes: &'a [u8], path: &'a Path) -> Result<NpyArray<'a>, IoError
     if !["<f4", ">f4", "<f8", ">f8", "=f4", "=f8"].contains(&kind) {
         return Err(bad(format!("its numbers are of the kind '{kind}', expected 32- or 64-bit floating point")));
     }
-    let (claimed, possible) = (claimed(&text), (bytes.len() - header) as u64);
+    let (claimed, possible) = (values_claimed(&text), (bytes.len() - header) as u64);
     if claimed > possible {
         return Err(IoError::Count { path: path.into(), what: "numbers".into(), claimed, possible });
     }
@@ -79,12 +79,12 @@ pub fn map(bytes: &[u8], path: &Path) -> Result<(usize, usize, Vec<f32>), IoErro
     Ok((width as usize, height as usize, values.into_iter().map(|v| v as f32).collect()))
 }
 
-pub(super) fn syntax(path: &Path, reason: String) -> IoError {
+fn syntax(path: &Path, reason: String) -> IoError {
     IoError::Syntax { path: path.into(), place: "npy".into(), reason }
 }
 
 /// Returns the number of bytes before the data of an `.npy` file.
-pub(super) fn header_len(bytes: &[u8]) -> Option<usize> {
+fn header_len(bytes: &[u8]) -> Option<usize> {
     let [0x93, b'N', b'U', b'M', b'P', b'Y', major, _, rest @ ..] = bytes else { return None };
     let (start, length) = match major {
         1 => (10, usize::from(u16::from_le_bytes(*rest.first_chunk()?))),
@@ -95,7 +95,7 @@ pub(super) fn header_len(bytes: &[u8]) -> Option<usize> {
 }
 
 /// Returns the product of the shape in an `.npy` header; `u64::MAX` if it has none or overflows.
-pub(super) fn claimed(text: &str) -> u64 {
+fn values_claimed(text: &str) -> u64 {
     let tuple = |text: &str| Some(text.split_once("shape")?.1.split_once('(')?.1.split_once(')')?.0.to_owned());
     // Of a shape that is given twice the library would take the last.
     let is_once = text.matches("shape").count() == 1;

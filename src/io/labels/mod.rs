@@ -118,9 +118,11 @@ impl Labels {
             }
             Some((_, masklets)) => (Source::Masklets(masklets), Vec::new()),
             None => {
-                if let Some(folder) = language_features::find(&path.join(language_features::FOLDER))? {
-                    let addresses = folder.addresses();
-                    return Ok(Self { source: Source::MaskFolder(folder), addresses, of: None, notes });
+                for name in [language_features::FOLDER, language_features::COMPRESSED] {
+                    if let Some(folder) = language_features::find(&path.join(name))? {
+                        let addresses = folder.addresses();
+                        return Ok(Self { source: Source::MaskFolder(folder), addresses, of: None, notes });
+                    }
                 }
                 let passed = notes.iter().map(|note| format!(" ({note})")).collect();
                 return Err(IoError::NoLabels { path: path.into(), passed });

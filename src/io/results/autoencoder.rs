@@ -17,8 +17,13 @@ const ABOVE: usize = 3;
 /// Reads the decoder of a result with codes of `dim` numbers.
 pub(super) fn read(runs: &LevelRuns, options: &ResultOptions, dim: usize) -> Result<Decoder, IoError> {
     let what = format!("codes of {dim} numbers with an autoencoder (autoencoder/ckpt/{}/best_ckpt.pth)", runs.scene);
-    let file = folder::helper(options.decoder.as_deref(), find(runs), &runs.folder, &what)?;
-    let mut tensors = Tensors::open(&file)?;
+    let found = find(&runs.scene, &runs.folder);
+    load(&folder::helper(options.decoder.as_deref(), found, &runs.folder, &what)?, dim)
+}
+
+/// Loads the decoder of codes of `dim` numbers from a checkpoint of the autoencoder.
+pub(in crate::io) fn load(file: &Path, dim: usize) -> Result<Decoder, IoError> {
+    let mut tensors = Tensors::open(file)?;
     let number = |name: &str| name.strip_prefix(LAYERS)?.strip_suffix(".weight")?.parse::<usize>().ok();
     let mut layers: Vec<usize> = tensors.names().filter_map(number).collect();
     layers.sort_unstable();
@@ -29,17 +34,17 @@ pub(super) fn read(runs: &LevelRuns, options: &ResultOptions, dim: usize) -> Res
         }
         steps.push(DecoderStep::Linear(tensors.layer(&format!("{LAYERS}{layer}"))?));
     }
-    let decoder = Decoder::new(dim, steps, &file)?;
+    let decoder = Decoder::new(dim, steps, file)?;
     match decoder.split() {
         (_, Some(_)) => Ok(decoder),
         _ => {
-            Err(IoError::syntax(&file, "decoder", "no tensors 'decoder.<n>.weight'; it is no autoencoder of LangSplat"))
+            Err(IoError::syntax(file, "decoder", "no tensors 'decoder.<n>.weight'; it is no autoencoder of LangSplat"))
         }
     }
 }
 
-fn find(runs: &LevelRuns) -> Option<PathBuf> {
-    let scene = &runs.scene;
+/// Looks for the autoencoder of a scene in a folder and those around it.
+pub(in crate::io) fn find(scene: &str, folder: &Path) -> Option<PathBuf> {
     let places = [
         format!("autoencoder/ckpt/{scene}"),
         format!("ckpt/{scene}"),
@@ -49,7 +54,7 @@ fn find(runs: &LevelRuns) -> Option<PathBuf> {
         "autoencoder".to_owned(),
         String::new(),
     ];
-    let folders = std::iter::successors(Some(runs.folder.as_path()), |f| f.parent()).take(ABOVE + 1);
+    let folders = std::iter::successors(Some(folder), |f| f.parent()).take(ABOVE + 1);
     let at = |folder: &Path| places.iter().map(|p| folder.join(p).join(FILE)).find(|file| file.is_file());
     folders.into_iter().find_map(at)
 }

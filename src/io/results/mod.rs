@@ -4,7 +4,7 @@
 //! its files; what a phrase, a click or a number means is in `pipeline/semantics/query/foreign`. A result that cannot be
 //! read exactly is refused with the reason.
 
-mod autoencoder;
+pub(in crate::io) mod autoencoder;
 mod decoder;
 mod face;
 mod faiss;
@@ -15,7 +15,7 @@ mod langsplat;
 mod legaussians;
 mod level_runs;
 mod lifted;
-mod numpy;
+pub(crate) mod numpy;
 mod open;
 mod open_gaussian;
 mod product;

@@ -16,8 +16,8 @@ const MAX_ENTRIES: usize = 256;
 
 /// An array with its bytes.
 #[derive(Debug)]
-pub(super) struct NumpyArray {
-    pub(super) shape: Vec<usize>,
+pub(in crate::io) struct NumpyArray {
+    pub(in crate::io) shape: Vec<usize>,
     /// Kind and size of a number: `f4`.
     kind: String,
     bytes: Vec<u8>,
@@ -29,7 +29,7 @@ pub(super) fn read(path: &Path) -> Result<NumpyArray, IoError> {
 }
 
 /// Parses the bytes of an `.npy` file.
-fn parse(mut bytes: Vec<u8>) -> Result<NumpyArray, String> {
+pub(in crate::io) fn parse(mut bytes: Vec<u8>) -> Result<NumpyArray, String> {
     let header = header_len(&bytes).ok_or("not an .npy file, or its header is cut off")?;
     let text = String::from_utf8_lossy(&bytes[..header]).into_owned();
     let quoted = |key: &str| text.split_once(key).and_then(|(_, rest)| rest.split('\'').nth(1));
@@ -71,7 +71,7 @@ fn header_len(bytes: &[u8]) -> Option<usize> {
 
 impl NumpyArray {
     /// The numbers, of which whole ones are converted.
-    pub(super) fn floats(&self) -> Vec<f32> {
+    pub(in crate::io) fn floats(&self) -> Vec<f32> {
         let b = &self.bytes;
         match self.kind.as_str() {
             "f2" => b.as_chunks().0.iter().map(|b| f16::from_le_bytes(*b).to_f32()).collect(),
@@ -144,7 +144,7 @@ impl<'a> NumpyArchive<'a> {
 }
 
 #[cfg(test)]
-pub(super) mod tests {
+pub(crate) mod tests {
     use std::io::Write;
 
     use zip::ZipWriter;

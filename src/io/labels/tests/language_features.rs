@@ -2,7 +2,8 @@
 
 use super::*;
 use crate::io::labels::nested::NO_MASK;
-use crate::io::npy_numbers::written;
+use crate::io::results::numpy;
+use crate::io::results::numpy::tests::npy;
 
 const W: usize = 20;
 const H: usize = 10;
@@ -20,14 +21,14 @@ fn levels() -> [Vec<i32>; 4] {
 
 fn masks(levels: &[Vec<i32>; 4]) -> Vec<u8> {
     let data: Vec<u8> = levels.iter().flatten().flat_map(|v| v.to_le_bytes()).collect();
-    written("<i4", &format!("(4, {H}, {W})"), &data)
+    npy("<i4", &[4, H, W], &data)
 }
 
 /// Vectors of 16-bit floats: the n-th has a one at n.
 fn vectors(count: usize, dimension: usize) -> Vec<u8> {
     let one = |i: usize| half::f16::from_f32(f32::from(u8::from(i / dimension == i % dimension)));
     let data: Vec<u8> = (0..count * dimension).flat_map(|i| one(i).to_le_bytes()).collect();
-    written("<f2", &format!("({count}, {dimension})"), &data)
+    npy("<f2", &[count, dimension], &data)
 }
 
 /// A folder with these files of the photo `a`.
@@ -92,7 +93,7 @@ fn fractions_are_read_as_numbers_and_what_is_none_is_refused() {
         let mut data: Vec<f32> = levels().iter().flatten().map(|v| *v as f32).collect();
         data[2 * W * H + 3] = v;
         let data: Vec<u8> = data.into_iter().flat_map(f32::to_le_bytes).collect();
-        let folder = folder(&written("<f4", &format!("(4, {H}, {W})"), &data), None);
+        let folder = folder(&npy("<f4", &[4, H, W], &data), None);
         Labels::open(folder.path()).expect("labels").of(&photo("a.png", 20, 10), 20)
     };
     assert_eq!(values(2.0).expect("regions").len(), 3);
@@ -123,16 +124,46 @@ fn arrays_that_do_not_fit_are_refused_by_name() {
     assert!(compressed.contains("autoencoder") && compressed.contains("language_features"), "{compressed}");
     assert!(text(read(&good, Some(&vectors(4, 768)), 20, 10)).contains("[4, 768]"));
     assert!(matches!(read(&good, None, 25, 10), Err(IoError::PhotoSize { .. })));
-    let three = written("<i4", &format!("(3, {H}, {W})"), &vec![0; 12 * W * H]);
+    let three = npy("<i4", &[3, H, W], &vec![0; 12 * W * H]);
     assert!(text(read(&three, None, 20, 10)).contains("[4, height, width]"));
-    let empty = written("<i4", "(4, 0, 20)", &[]);
+    let empty = npy("<i4", &[4, 0, 20], &[]);
     assert!(matches!(read(&empty, None, 20, 10), Err(IoError::EmptyPicture { .. })));
-    let claims = written("<i4", "(4, 1000000, 1000000)", &[0; 16]);
-    assert!(matches!(read(&claims, None, 20, 10), Err(IoError::Count { .. })));
+    let claims = npy("<i4", &[4, 1_000_000, 1_000_000], &[0; 16]);
+    assert!(text(read(&claims, None, 20, 10)).contains("does not fit"));
     let mut endless = vectors(4, 512);
     let at = endless.len() - 2;
     endless[at..].copy_from_slice(&[0x00, 0x7c]);
     assert!(text(read(&good, Some(&endless), 20, 10)).contains("vector 3 is not finite"));
     let cut = &good[..good.len() - 1];
-    assert!(matches!(read(cut, None, 20, 10), Err(IoError::Count { .. })));
+    assert!(text(read(cut, None, 20, 10)).contains("does not fit"));
+}
+
+#[test]
+fn compressed_vectors_are_decoded_by_the_autoencoder_beside() {
+    let samples = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/results/langsplat");
+    let expected =
+        |name: &str| numpy::parse(fs::read(samples.join("expected").join(name)).expect(name)).expect(name).floats();
+    let whole = tempfile::tempdir().expect("folder");
+    let inner = whole.path().join("made_up/language_features_dim3");
+    fs::create_dir_all(&inner).expect("folder");
+    fs::write(inner.join("a_s.npy"), masks(&levels())).expect("write");
+    let codes = expected("codes_1.npy");
+    let codes: Vec<f32> = codes[..12].chunks(3).flat_map(|c| crate::math::vector::unit(c).expect("not zero")).collect();
+    let data: Vec<u8> = codes.iter().flat_map(|v| v.to_le_bytes()).collect();
+    fs::write(inner.join("a_f.npy"), npy("<f4", &[4, 3], &data)).expect("write");
+    let data_set = whole.path().join("made_up");
+    let refused = text(Labels::open(&data_set));
+    assert!(refused.contains("autoencoder/ckpt/made_up/best_ckpt.pth"), "{refused}");
+    let autoencoder = whole.path().join("autoencoder/ckpt/made_up");
+    fs::create_dir_all(&autoencoder).expect("folder");
+    fs::copy(samples.join("autoencoder/ckpt/made_up/best_ckpt.pth"), autoencoder.join("best_ckpt.pth"))
+        .expect("copied");
+    let labels = Labels::open(&data_set).expect("labels");
+    let read = labels.vectors(&photo("a.png", 20, 10), 20).expect("read").expect("vectors");
+    let far = |wanted: &[f32]| {
+        let off = |mask: usize| read.of(mask as u16).iter().zip(&wanted[512 * mask..]).map(|(a, b)| (a - b).abs());
+        (0..4).flat_map(off).fold(0.0, f32::max)
+    };
+    assert!(far(&expected("decoded_first_rows_1.npy")) < 1e-4);
+    assert!(far(&expected("decoded_first_rows_2.npy")) > 1e-3, "the control: codes of another level");
 }

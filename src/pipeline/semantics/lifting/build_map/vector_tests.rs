@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use glam::DVec3;
 
 use super::*;
-use crate::io::npy_numbers::written;
+use crate::io::results::numpy::tests::npy;
 use crate::math::vector::unit;
 use crate::pipeline::observer::Silent;
 use crate::pipeline::semantics::relevancy::deviate;
@@ -74,14 +74,14 @@ fn write(folder: &Path, turned: bool) {
             view.mask(&identities(), *id).pixels().for_each(|i| levels[*level][i] = number as f32);
         }
         let data: Vec<u8> = levels.concat().iter().flat_map(|v| v.to_le_bytes()).collect();
-        let shape = format!("(4, {}, {})", view.height_px, view.width_px);
-        std::fs::write(folder.join(format!("view_{p}_s.npy")), written("<f4", &shape, &data)).expect("written");
+        let shape = [4, view.height_px, view.width_px];
+        std::fs::write(folder.join(format!("view_{p}_s.npy")), npy("<f4", &shape, &data)).expect("written");
         let mut rows: Vec<Vec<f32>> = masks.iter().map(|(id, _)| vector(*id as usize, p)).collect();
         if turned {
             rows.swap(0, 1);
         }
         let data: Vec<u8> = rows.concat().iter().flat_map(|v| v.to_le_bytes()).collect();
-        std::fs::write(folder.join(format!("view_{p}_f.npy")), written("<f4", "(5, 512)", &data)).expect("written");
+        std::fs::write(folder.join(format!("view_{p}_f.npy")), npy("<f4", &[5, DIMENSION], &data)).expect("written");
     }
 }
 
