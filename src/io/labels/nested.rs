@@ -30,13 +30,21 @@ pub(super) fn nested(levels: &[&[u16]]) -> Vec<NestedMask> {
     let mut areas: BTreeMap<(usize, u16), usize> = BTreeMap::new();
     let mut overlaps: HashMap<(usize, u16), BTreeMap<(usize, u16), usize>> = HashMap::new();
     let pixels = levels.first().map_or(0, |level| level.len());
-    for i in 0..pixels {
+    let alike = |a: usize, b: usize| levels.iter().all(|level| level[a] == level[b]);
+    // Counted by runs of pixels of the same masks.
+    let mut begin = 0;
+    for end in 1..=pixels {
+        if end < pixels && alike(begin, end) {
+            continue;
+        }
+        let (i, run) = (begin, end - begin);
         for (k, level) in levels.iter().enumerate().filter(|(_, level)| level[i] != NO_MASK) {
-            *areas.entry((k, level[i])).or_default() += 1;
+            *areas.entry((k, level[i])).or_default() += run;
             for (j, coarser) in levels[..k].iter().enumerate().filter(|(_, level)| level[i] != NO_MASK) {
-                *overlaps.entry((k, level[i])).or_default().entry((j, coarser[i])).or_default() += 1;
+                *overlaps.entry((k, level[i])).or_default().entry((j, coarser[i])).or_default() += run;
             }
         }
+        begin = end;
     }
     let mut list: Vec<NestedMask> = Vec::new();
     let mut place_of: HashMap<(usize, u16), usize> = HashMap::new();

@@ -13,6 +13,8 @@ use crate::io::{IoError, files, memory};
 const MAX_HEADER_BYTES: usize = 1024;
 /// Most arrays of an archive.
 const MAX_ENTRIES: usize = 256;
+/// Kinds of numbers, with their bytes.
+const KINDS: [&str; 12] = ["f2", "f4", "f8", "i1", "i2", "i4", "i8", "u1", "u2", "u4", "u8", "b1"];
 
 /// An array with its bytes.
 #[derive(Debug)]
@@ -35,8 +37,8 @@ pub(in crate::io) fn parse(mut bytes: Vec<u8>) -> Result<NumpyArray, String> {
     let quoted = |key: &str| text.split_once(key).and_then(|(_, rest)| rest.split('\'').nth(1));
     let descr = quoted("'descr'").unwrap_or_default();
     let (order, kind) = descr.split_at_checked(1).unwrap_or(("", ""));
-    let size = kind.get(1..).and_then(|s| s.parse::<usize>().ok()).filter(|n| matches!(n, 1 | 2 | 4 | 8));
-    let known = matches!(kind.get(..1), Some("f" | "i" | "u" | "b")) && matches!(order, "<" | "|" | "=");
+    let size = kind.get(1..).and_then(|s| s.parse::<usize>().ok());
+    let known = KINDS.contains(&kind) && matches!(order, "<" | "|" | "=");
     let Some(size) = size.filter(|_| known) else {
         let reason =
             format!("its numbers are of the kind '{descr}'; save it as little-endian numbers, not as Python objects");
@@ -201,6 +203,7 @@ pub(crate) mod tests {
             (npy("<f4", &[1 << 60, 1 << 60], &[0; 4]), "does not fit"),
             (npy("|O", &[1], &[0; 8]), "Python objects"),
             (npy(">f4", &[1], &[0; 4]), "little-endian"),
+            (npy("<f1", &[1], &[0]), "'<f1'"),
             (npy("<f4", &[1], &[0; 4])[..20].to_vec(), "cut off"),
             (b"hello".to_vec(), "not an .npy"),
         ] {
