@@ -43,6 +43,7 @@ mod reader;
 mod removed;
 mod render_mode;
 mod resample;
+pub mod results;
 pub(crate) mod scene_copy;
 pub(crate) mod scene_files;
 pub(crate) mod scene_folder;
