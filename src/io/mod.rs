@@ -33,9 +33,11 @@ mod open;
 pub(crate) mod page;
 pub mod photo;
 mod photo_list;
+pub(crate) mod photo_source;
 mod pixel_masks;
 mod ply;
 pub mod points_ply;
+mod posed;
 mod quantized;
 mod reader;
 mod removed;
@@ -58,16 +60,16 @@ pub mod spz;
 pub(crate) mod temporary;
 #[cfg(test)]
 mod test_clouds;
-#[allow(dead_code)]
 pub(crate) mod torch;
 pub mod trained;
+pub(crate) mod trainings;
 pub mod transforms;
 pub(crate) mod unposed;
 mod vertical;
 pub(crate) mod video;
 
 pub use error::{IoError, OpenError};
-pub(crate) use open::data_set_around;
 pub use open::{Opened, open, open_in};
+pub(crate) use open::{data_set_around, open_beside};
 pub use scene_folder::SceneFolder;
 pub(crate) use trained::TrainedScene;

@@ -29,7 +29,7 @@ use std::path::Path;
 use zip::ZipArchive;
 
 use super::{IoError, files};
-use tensor::Place;
+use tensor::StoragePlace;
 pub(crate) use tensor::{Dtype, StoredTensor};
 pub(crate) use tree::TorchTree;
 
@@ -85,7 +85,7 @@ pub(crate) struct WeightFile {
     /// Values beside the tensors; empty for safetensors.
     pub(crate) tree: TorchTree,
     /// Storage that was read last: tensors may share one.
-    last: Option<(Place, Vec<u8>)>,
+    last: Option<(StoragePlace, Vec<u8>)>,
 }
 
 impl WeightFile {
@@ -122,6 +122,7 @@ impl WeightFile {
     }
 
     /// Reads the values of a tensor of whole numbers or truth values, row-major.
+    #[allow(dead_code, reason = "results of other methods need it")]
     pub(crate) fn integers(&mut self, name: &str) -> Result<Vec<i64>, WeightFileError> {
         let tensor = self.tensor(name)?;
         if tensor.dtype.is_float() {

@@ -37,8 +37,10 @@ pub(super) enum PickleNode {
 pub(super) enum Global {
     OrderedDict,
     Tensor,
-    /// Function that returns its first argument: a parameter, a list with its type, bytes as text.
+    /// Function that returns its first argument: a parameter, a list with its type.
     First,
+    /// Bytes, which Python writes as text of the same code points.
+    Latin1,
     /// Settings such as a device, whose value is not needed.
     Setting,
     NumpyScalar,
@@ -56,19 +58,19 @@ impl Global {
             ("torch._utils", "_rebuild_parameter" | "_rebuild_parameter_with_state")
             | ("torch", "Size")
             | ("collections", "Counter")
-            // Bytes, which Python writes as text of the same code points.
-            | ("_codecs", "encode")
             | (
                 "torch.jit._pickle",
                 "restore_type_tag" | "build_intlist" | "build_doublelist" | "build_boollist" | "build_tensorlist",
             ) => Self::First,
+            ("_codecs", "encode") => Self::Latin1,
             ("numpy.core.multiarray" | "numpy._core.multiarray", "scalar") => Self::NumpyScalar,
             ("numpy.core.multiarray" | "numpy._core.multiarray", "_reconstruct") => Self::NumpyArray,
             ("numpy", "ndarray") => Self::Setting,
             ("numpy", "dtype") => Self::NumpyDtype,
-            ("torch", "device" | "float64" | "float32" | "float16" | "bfloat16" | "int64" | "int32" | "uint8" | "bool") => {
-                Self::Setting
-            }
+            (
+                "torch",
+                "device" | "float64" | "float32" | "float16" | "bfloat16" | "int64" | "int32" | "uint8" | "bool",
+            ) => Self::Setting,
             ("torch", storage) => Self::Storage(Dtype::of_storage(storage)?),
             (module, _) if module == "__torch__" || module.starts_with("__torch__.") => Self::Module,
             _ => return None,

@@ -321,6 +321,13 @@ impl Machine<'_> {
                     tensor.ok_or_else(|| self.malformed("a tensor without storage or shape"))?,
                 ))
             }
+            Global::Latin1 => match self.items(&arguments) {
+                [Value::Text(text), Value::Text(code)] if &**code == "latin1" => {
+                    let text = text.clone();
+                    self.push(Value::Text(text))
+                }
+                _ => Err(self.malformed("bytes in a code other than Latin-1")),
+            },
             Global::Setting => self.push(Value::Nothing),
             Global::NumpyArray => self.node(PickleNode::NumpyArray),
             Global::NumpyDtype => match self.items(&arguments).first() {

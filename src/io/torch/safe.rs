@@ -7,7 +7,7 @@ use std::io::{Read, Seek, SeekFrom};
 use safetensors::tensor::Metadata;
 
 use super::WeightFileError;
-use super::tensor::{Dtype, Place, StoredTensor};
+use super::tensor::{Dtype, StoragePlace, StoredTensor};
 
 /// Largest header, bytes; those of official files have about 100 kB.
 const MOST_HEADER: u64 = 16 << 20;
@@ -50,7 +50,7 @@ pub(super) fn open(file: &mut File) -> Result<BTreeMap<String, StoredTensor>> {
         for axis in (1..strides.len()).rev() {
             strides[axis - 1] = info.shape[axis].saturating_mul(strides[axis]);
         }
-        let place = Place::Range(start + begin as u64, length as u64);
+        let place = StoragePlace::Range(start + begin as u64, length as u64);
         let view = (info.shape.clone(), strides, 0);
         let tensor = StoredTensor::new(dtype, view, length / dtype.bytes(), place).map_err(failed)?;
         tensors.insert(name.clone(), tensor);
@@ -59,8 +59,8 @@ pub(super) fn open(file: &mut File) -> Result<BTreeMap<String, StoredTensor>> {
 }
 
 /// Reads the bytes of a tensor.
-pub(super) fn storage(file: &mut File, place: Place) -> Result<Vec<u8>> {
-    let Place::Range(start, length) = place else { return Ok(Vec::new()) };
+pub(super) fn storage(file: &mut File, place: StoragePlace) -> Result<Vec<u8>> {
+    let StoragePlace::Range(start, length) = place else { return Ok(Vec::new()) };
     file.seek(SeekFrom::Start(start))?;
     let mut bytes = Vec::new();
     file.take(length).read_to_end(&mut bytes)?;

@@ -71,7 +71,7 @@ impl Dtype {
 
 /// Location of bytes in a file: an entry of an archive, or a range.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Place {
+pub(super) enum StoragePlace {
     Entry(usize),
     Range(u64, u64),
 }
@@ -85,7 +85,7 @@ pub(crate) struct StoredTensor {
     strides: Vec<usize>,
     /// Offset of the first element, elements.
     offset: usize,
-    pub(super) place: Place,
+    pub(super) place: StoragePlace,
     /// Number of elements in its storage.
     elements: usize,
 }
@@ -96,7 +96,7 @@ impl StoredTensor {
         dtype: Dtype,
         (shape, strides, offset): (Vec<usize>, Vec<usize>, usize),
         elements: usize,
-        place: Place,
+        place: StoragePlace,
     ) -> Result<Self, String> {
         let reach = || {
             let last = shape.iter().zip(&strides).try_fold(offset, |last, (n, stride)| {

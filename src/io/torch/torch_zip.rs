@@ -10,7 +10,7 @@ use zip::{CompressionMethod, ZipArchive};
 use super::WeightFileError;
 use super::parts::{PickleNode, TensorRecord, Value};
 use super::pickle;
-use super::tensor::{Place, StoredTensor};
+use super::tensor::{StoragePlace, StoredTensor};
 use super::tree::TorchTree;
 
 /// Largest pickle, bytes; those of official files have about 100 kB.
@@ -53,22 +53,22 @@ pub(super) fn open(file: File) -> Result<(Archive, BTreeMap<String, StoredTensor
 }
 
 /// Reads the bytes of a storage and verifies their checksum.
-pub(super) fn storage(archive: &mut Archive, place: Place) -> Result<Vec<u8>> {
+pub(super) fn storage(archive: &mut Archive, place: StoragePlace) -> Result<Vec<u8>> {
     match place {
-        Place::Entry(i) => entry(archive, i, u64::MAX),
-        Place::Range(..) => Ok(Vec::new()),
+        StoragePlace::Entry(i) => entry(archive, i, u64::MAX),
+        StoragePlace::Range(..) => Ok(Vec::new()),
     }
 }
 
 /// Reads parts of these lengths of a storage, one after the other from the byte `begin`, and verifies its checksum.
 pub(super) fn parts(
     archive: &mut Archive,
-    place: Place,
+    place: StoragePlace,
     begin: usize,
     lengths: impl Iterator<Item = usize>,
     each: &mut dyn FnMut(&[u8]),
 ) -> Result<()> {
-    let Place::Entry(index) = place else { return Ok(()) };
+    let StoragePlace::Entry(index) = place else { return Ok(()) };
     let (mut file, name) = stored_entry(archive, index, u64::MAX)?;
     let failed = |e: io::Error| WeightFileError::Entry { entry: name.clone(), problem: format!("is damaged: {e}") };
     io::copy(&mut (&mut file).take(begin as u64), &mut io::sink()).map_err(failed)?;
@@ -127,7 +127,7 @@ fn stored(archive: &mut Archive, root: &str, name: &str, record: TensorRecord) -
         return Err(failed(format!("states {elements} numbers of {bytes} bytes, but '{path}' has {size} bytes")));
     }
     let view = (record.shape, record.strides, record.offset);
-    StoredTensor::new(record.dtype, view, record.elements, Place::Entry(index)).map_err(failed)
+    StoredTensor::new(record.dtype, view, record.elements, StoragePlace::Entry(index)).map_err(failed)
 }
 
 /// Lists all tensors of a pickle by their path of keys, joined by dots.

@@ -17,6 +17,7 @@ impl Default for TorchTree {
 
 impl TorchTree {
     /// Returns a number or a truth value, one of NumPy included.
+    #[allow(dead_code, reason = "results of other methods need it")]
     pub(crate) fn number(&self, path: &str) -> Option<f64> {
         match self.at(&self.root, path)? {
             Value::Int(n) => Some(*n as f64),
@@ -27,6 +28,7 @@ impl TorchTree {
     }
 
     /// Returns a text.
+    #[allow(dead_code, reason = "results of other methods need it")]
     pub(crate) fn text(&self, path: &str) -> Option<&str> {
         match self.at(&self.root, path)? {
             Value::Text(text) => Some(text),
@@ -44,6 +46,7 @@ impl TorchTree {
     }
 
     /// Lists the keys of a dictionary, in order.
+    #[allow(dead_code, reason = "results of other methods need it")]
     pub(crate) fn keys(&self, path: &str) -> Vec<String> {
         match self.at(&self.root, path).and_then(|value| self.node(value)) {
             Some(PickleNode::Dict(entries)) => entries.iter().filter_map(|(key, _)| named(key)).collect(),
