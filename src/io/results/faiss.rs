@@ -36,7 +36,7 @@ fn read(path: &Path) -> Result<PqIndex, IoError> {
     parse(&bytes, path)
 }
 
-/// What every index begins with: kind, numbers of a vector, number of vectors.
+/// Reads the beginning of an index: kind, numbers of a vector, number of vectors.
 fn head<'a>(r: &mut Reader<'a>, path: &Path, kind: &[u8; 4]) -> Result<(usize, u64), IoError> {
     let found = r.array::<4>("the kind")?;
     if found != *kind {

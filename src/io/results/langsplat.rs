@@ -85,7 +85,7 @@ pub(super) fn read(runs: &LevelRuns, options: &ResultOptions) -> Result<MethodRe
             Method::LangSplatV2 => weights(&mut tensors, file, options)?,
             Method::OccamsLgs => EmbeddedLevel {
                 codes: LevelCodes::Dense(tensors.half_rows(FEATURES)?),
-                is_unit: true,
+                is_unit: false,
                 decoder: Decoder::none(CLIP),
             },
             Method::DrSplat => product(&mut tensors, file, options)?,

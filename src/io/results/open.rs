@@ -48,7 +48,7 @@ pub fn open_result(path: &Path, options: &ResultOptions) -> Result<MethodResult,
     }
     Err(IoError::Unsupported {
         path: path.into(),
-        what: "no files of a method that is known".into(),
+        what: "files of no method that is known".into(),
         remedy: "known are Gaussian Grouping, Gaga, OmniSeg3D-GS, OpenGaussian, Feature 3DGS, SAGA, LEGaussians, \
                  LangSplat, LangSplatV2, Occam's LGS, Dr.Splat, THGS, ReLaGS, splat-distiller and LUDVIG",
     })

@@ -9,7 +9,7 @@ pub struct SparseRows {
     entries: Vec<(u16, f32)>,
 }
 
-/// What is added to the sum of the weights that are kept before they are divided by it, as LangSplatV2 does.
+/// Number that LangSplatV2 adds to the sum of the kept weights before they are divided by it.
 const TINY: f32 = 1e-10;
 
 impl SparseRows {

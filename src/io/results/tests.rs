@@ -229,7 +229,7 @@ fn what_cannot_be_opened_exactly_is_refused_with_the_reason() {
         ("laga", "LaGa"),
         ("3dgs/chkpnt30000.pth", "without language features"),
         ("3dgs", "without language features"),
-        ("2dgs", "no files of a method"),
+        ("2dgs", "files of no method"),
         ("splatfacto/made_up/splatfacto/2026-01-02_030405/nerfstudio_models/step-000029999.ckpt", "nerfstudio"),
         ("nowhere", "cannot read"),
     ] {

@@ -1,6 +1,8 @@
 //! Objects of features that are alike where Gaussians belong together, as SAGA finds them: HDBSCAN on a sample, and the
 //! most alike center for all others.
 
+use std::collections::HashSet;
+
 use hdbscan::{Hdbscan, HdbscanHyperParams};
 use rand::SeedableRng;
 use rand::seq::index;
@@ -33,7 +35,10 @@ pub fn objects(features: &FeatureRows, gate: Option<&ScaleGate>, scale: f32) -> 
     let mut chosen = index::sample(&mut rng, n, amount).into_vec();
     chosen.sort_unstable();
     let direction = |feature: &[f32]| unit(&weighed(feature, &weights));
-    let sample: Vec<Vec<f32>> = chosen.iter().filter_map(|i| direction(&features.row(*i))).collect();
+    let mut sample: Vec<Vec<f32>> = chosen.iter().filter_map(|i| direction(&features.row(*i))).collect();
+    // Equal ones have no distance, by which the algorithm divides.
+    let mut known = HashSet::new();
+    sample.retain(|v| known.insert(v.iter().map(|x| x.to_bits()).collect::<Vec<u32>>()));
     let centers = centers(&sample);
     let nearest = |feature: &[f32]| {
         let own = direction(feature)?;
@@ -64,28 +69,34 @@ fn centers(sample: &[Vec<f32>]) -> Vec<Vec<f32>> {
 mod tests {
     use super::*;
 
-    #[test]
-    fn features_of_one_direction_are_an_object() {
-        // Three directions with a little noise; a Gaussian without direction.
+    /// Features of 300 Gaussians in `kinds` directions with a little noise, and one without direction.
+    fn in_directions(kinds: usize) -> FeatureRows {
         let row = |i: usize| {
-            let noise = ((i * 7919) % 101) as f32 * 2e-4;
-            let mut row = [noise, 0.0, noise * 0.5];
-            row[i % 3] += 1.0;
-            row
+            let noise = [3_u64, 5, 7].map(|k| ((i as u64 * 7919 * k) % 101) as f32 * 1e-4);
+            std::array::from_fn::<f32, 3, _>(|c| noise[c] + f32::from(u8::from(c == i % kinds)))
         };
         let mut values: Vec<f32> = (0..300).flat_map(row).collect();
         values.extend([0.0; 3]);
-        let features = FeatureRows::new(3, values).expect("whole rows");
-        let found = objects(&features, None, 0.5);
-        assert_eq!(found[300], None);
-        let mut kinds: Vec<Option<u32>> = found[..3].to_vec();
-        kinds.sort_unstable();
-        kinds.dedup();
-        assert_eq!(kinds.len(), 3, "{kinds:?}");
-        assert!((0..300).all(|i| found[i] == found[i % 3]));
-        // A gate that closes two channels leaves one object, which does not stand out.
-        let gate = ScaleGate { weight: vec![0.0; 3], bias: vec![20.0, -200.0, -200.0] };
-        let closed = objects(&features, Some(&gate), 0.5);
-        assert_ne!(closed, found, "the control");
+        FeatureRows::new(3, values).expect("whole rows")
+    }
+
+    #[test]
+    fn features_of_one_direction_are_an_object() {
+        for kinds in [2, 3] {
+            let found = objects(&in_directions(kinds), None, 0.5);
+            assert_eq!(found[300], None);
+            let mut numbers: Vec<Option<u32>> = found[..kinds].to_vec();
+            numbers.sort_unstable();
+            numbers.dedup();
+            assert_eq!(numbers.len(), kinds, "{numbers:?}");
+            assert!((0..300).all(|i| found[i] == found[i % kinds]));
+        }
+    }
+
+    #[test]
+    fn equal_features_are_no_reason_to_fail() {
+        let equal = FeatureRows::new(2, [1.0, 0.0].repeat(200)).expect("whole rows");
+        assert!(objects(&equal, None, 0.5).iter().all(|id| *id == objects(&equal, None, 0.5)[0]));
+        assert!(objects(&FeatureRows::default(), None, 0.5).is_empty());
     }
 }

@@ -26,7 +26,7 @@ pub struct ForeignScene {
     heads: Vec<Option<CosineHead>>,
 }
 
-/// What phrases need of a level in a view.
+/// Numbers of a level in a view that phrases are compared with.
 #[derive(Clone, Debug)]
 pub(crate) enum LevelView {
     /// The blended numbers.

@@ -12,7 +12,7 @@ use crate::scene::{Camera, GaussianCloud};
 const PASS: usize = MAX_CHANNELS - 4;
 /// Gaussians per thread.
 const GAUSSIANS_PER_TASK: usize = 1 << 10;
-/// What LangSplat adds to the length that it divides by.
+/// Number that LangSplat adds to the length that it divides by.
 const TINY: f32 = 1e-9;
 
 /// Blended numbers of a view, a plane for each.

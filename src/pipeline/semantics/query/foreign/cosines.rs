@@ -11,7 +11,7 @@ pub(crate) const BLOCK: usize = 32;
 /// Squared length under which an embedding has no direction.
 const NO_LENGTH: f32 = 1e-20;
 
-/// What of a decoder does not depend on phrases.
+/// Parts of a decoder that do not depend on phrases.
 #[derive(Clone, Debug)]
 pub(crate) struct CosineHead {
     inputs: usize,
