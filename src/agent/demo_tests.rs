@@ -147,5 +147,13 @@ fn what_is_said_of_the_demo_is_done_or_refused() {
             }
         }
         assert!(wrong.is_empty(), "{match_by}:\n{}", wrong.join("\n"));
+        // Several things become one sentence on the final state.
+        for (text, what) in [
+            ("hide everything except the two controllers", "the red controller and the blue controller are"),
+            ("show only the mug", "the mug is"),
+        ] {
+            let reply = session.say(&mut world, text, &mut |_| {}, &AtomicBool::new(false));
+            assert_eq!(reply.text, format!("Only {what} drawn now; say 'show everything' for the rest."), "{match_by}");
+        }
     }
 }

@@ -10,7 +10,7 @@ use super::refusal::{Refusal, RefusalKind};
 use super::resolve::{Resolved, resolve};
 use super::tool::{Reference, Target, ToolCall};
 use super::world::{Unreachable, World, WorldError};
-use crate::math::format::capital;
+use crate::math::format::{self, capital};
 use crate::navigate::target::Side;
 use crate::scene::{IdentityId, LevelFilter, NO_IDENTITY};
 
@@ -347,10 +347,9 @@ fn act(
         ToolCall::Isolate { .. } => {
             dialog.isolated.push(id);
             world.isolate(&dialog.isolated).map_err(failed)?;
-            match dialog.isolated.len() {
-                1 => format!("Only {it} is drawn now; say 'show everything' for the rest."),
-                _ => format!("{} is drawn, too.", capital(&it)),
-            }
+            let names: Vec<String> = dialog.isolated.iter().map(|id| the(world, *id)).collect();
+            let are = if names.len() > 1 { "are" } else { "is" };
+            format!("Only {} {are} drawn now; say 'show everything' for the rest.", format::list(&names))
         }
         ToolCall::Hide { .. } => {
             world.set_hidden(id, true).map_err(failed)?;

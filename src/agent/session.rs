@@ -361,8 +361,9 @@ impl Session {
         });
         // A planner that speaks for itself does not know the private results, so they are added to its text.
         let speaks = self.planner.speaks() && !text.is_empty();
-        let mut said: Vec<&str> =
-            outcomes.iter().filter(|o| !speaks || o.is_private()).map(|o| o.text.as_str()).collect();
+        let told =
+            outcomes.iter().enumerate().filter(|(i, o)| (!speaks || o.is_private()) && !is_outdated(outcomes, *i));
+        let mut said: Vec<&str> = told.map(|(_, o)| o.text.as_str()).collect();
         if let Some(refusal) = refused.as_ref().filter(|r| said.last() != Some(&r.text.as_str()) && text != r.text) {
             said.push(&refusal.text);
         }
@@ -382,4 +383,10 @@ impl Session {
         said.push(&refusal.text);
         Reply { text: said.join(" "), refused: Some(refusal.clone()), ..Reply::default() }
     }
+}
+
+/// True if a later result tells the state that this one told: of several isolated things, the last names all.
+fn is_outdated(outcomes: &[CallOutcome], at: usize) -> bool {
+    let isolates = |o: &CallOutcome| o.refused.is_none() && matches!(o.call, ToolCall::Isolate { .. });
+    isolates(&outcomes[at]) && outcomes[at + 1..].iter().any(isolates)
 }

@@ -44,7 +44,7 @@ impl FolderLock {
             if !is_at(&file, &path) {
                 continue;
             }
-            let told = format!("process {} ({what})", std::process::id());
+            let told = format!("{}({what})", process());
             // Shown to users only, so a full disk does not matter.
             let _ = file.set_len(0).and_then(|()| file.rewind()).and_then(|()| file.write_all(told.as_bytes()));
             return Ok(Self { folder: folder.into(), _file: file });
@@ -54,6 +54,32 @@ impl FolderLock {
     pub(crate) fn folder(&self) -> &Path {
         &self.folder
     }
+}
+
+/// Process that writes into a folder.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) struct FolderHolder {
+    /// Its work, such as "training"; empty if it did not say.
+    pub(crate) what: String,
+    /// True if it is this process.
+    pub(crate) is_own: bool,
+}
+
+/// Returns the process that has locked `folder`, if one has.
+pub(crate) fn holder(folder: &Path) -> Option<FolderHolder> {
+    let file = File::open(folder.join(FILE)).ok()?;
+    if !matches!(file.try_lock_shared(), Err(TryLockError::WouldBlock)) {
+        return None;
+    }
+    let mut told = String::new();
+    let _ = file.take(MAX_BYTES).read_to_string(&mut told);
+    let what = told.split_once('(').and_then(|(_, what)| what.strip_suffix(')')).unwrap_or_default();
+    Some(FolderHolder { what: what.into(), is_own: told.starts_with(&process()) })
+}
+
+/// Beginning of the description of this process.
+fn process() -> String {
+    format!("process {} ", std::process::id())
 }
 
 impl Drop for FolderLock {
@@ -90,11 +116,18 @@ mod tests {
         let e = FolderLock::take(folder.path(), "finding objects").expect_err("taken");
         let text = e.to_string();
         assert!(text.contains("training") && text.contains(&std::process::id().to_string()), "{text}");
+        assert_eq!(holder(folder.path()), Some(FolderHolder { what: "training".into(), is_own: true }));
         drop(first);
+        assert_eq!(holder(folder.path()), None);
         drop(FolderLock::take(folder.path(), "finding objects").expect("free again"));
         assert_eq!(fs::read_dir(folder.path()).expect("list").count(), usize::from(!cfg!(unix)));
         // A lock file left by a killed process blocks nobody.
         fs::write(folder.path().join(FILE), "process 1 (training)").expect("written");
+        assert_eq!(holder(folder.path()), None, "the control: nobody holds it");
+        let other = File::open(folder.path().join(FILE)).expect("there");
+        other.lock().expect("locked");
+        assert_eq!(holder(folder.path()), Some(FolderHolder { what: "training".into(), is_own: false }));
+        drop(other);
         drop(FolderLock::take(folder.path(), "training").expect("free"));
         assert!(FolderLock::take(&folder.path().join("missing"), "x").is_err());
     }

@@ -12,8 +12,8 @@ use std::path::{Path, PathBuf};
 use super::atomic::Draft;
 use super::commit::{self, Commit};
 use super::error::write_error;
-use super::folder_lock::{self, FolderLock};
-use super::scene_files::{self, CHECKPOINT_FILE, CLOUD_FILE, SCENE_FILE, is_scene};
+use super::folder_lock::{self, FolderHolder, FolderLock};
+use super::scene_files::{self, CHECKPOINT_FILE, CLOUD_FILE, SCENE_FILE, SELECTION_FILE, is_scene};
 use super::scene_info::{SceneInfo, VERSION, load_info, relative_to};
 use super::temporary::{sweep, temporary_folder};
 use super::{IoError, files, semantic_map, splat_ply};
@@ -43,6 +43,11 @@ impl SceneFolder {
         Ok(Self { lock })
     }
 
+    /// Returns the process that holds `folder`, if one does.
+    pub(crate) fn holder(folder: &Path) -> Option<FolderHolder> {
+        folder_lock::holder(folder)
+    }
+
     /// Moves a scene to a folder beside it, away from a process that may still write to it; later writes of that
     /// process have no folder. `to` must not exist.
     pub(crate) fn move_away(from: &Path, to: &Path) -> Result<(), IoError> {
@@ -70,7 +75,8 @@ impl SceneFolder {
         let entries = fs::read_dir(&folder).and_then(Iterator::collect::<io::Result<Vec<_>>>);
         let entries = entries.map_err(|cause| write_error(&folder, cause))?;
         let mut names = entries.iter().map(fs::DirEntry::file_name);
-        if !names.all(|name| name == folder_lock::FILE || scene_files::FILES.iter().any(|file| name == *file)) {
+        let made_anew = [folder_lock::FILE, SELECTION_FILE];
+        if !names.all(|name| scene_files::FILES.iter().chain(&made_anew).any(|file| name == *file)) {
             return Err(IoError::HoldsMore { folder });
         }
         held.take_away()

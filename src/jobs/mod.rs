@@ -32,6 +32,7 @@ pub(crate) mod measurements;
 pub(crate) mod models;
 pub mod open;
 pub(crate) mod page;
+pub(crate) mod phases;
 pub(crate) mod photos_without;
 pub mod phrases;
 pub(crate) mod plan;

@@ -7,8 +7,10 @@ use std::time::SystemTime;
 
 use super::{Folders, JobError};
 use crate::io::error::write_error;
+use crate::io::folder_lock::FolderHolder;
 use crate::io::scene_files::{SCENE_FILE, is_scene};
-use crate::io::{SceneFolder, atomic, files, semantic_map, trained};
+use crate::io::trained::SceneInfo;
+use crate::io::{IoError, SceneFolder, atomic, files, semantic_map, trained};
 use crate::math::format;
 use crate::scene::text;
 
@@ -28,15 +30,21 @@ pub struct RunSummary {
     pub objects: usize,
     /// True if it is a training; false if it was made of one by an edit.
     pub(crate) is_training: bool,
-    /// Time of its last save.
+    /// Time of its last save; `None` if a process works on it that has not saved anything yet.
     pub(crate) changed: Option<SystemTime>,
+    /// The process that writes to it, such as a training.
+    pub(crate) holder: Option<FolderHolder>,
     counted: String,
     psnr: Option<f64>,
 }
 
 impl RunSummary {
     fn of(folders: &Folders, folder: PathBuf) -> Option<Self> {
-        let info = trained::load_info(&folder).ok()?;
+        let holder = SceneFolder::holder(&folder);
+        let info = match trained::load_info(&folder) {
+            Err(_) if holder.is_some() && !is_scene(&folder) => SceneInfo::default(),
+            info => info.ok()?,
+        };
         let is_training = folders.is_training(&folder);
         let last = info.history.evaluations.last();
         let steps = info.history.steps.last().map(|s| s.step).or(last.map(|e| e.step)).unwrap_or(0);
@@ -48,7 +56,7 @@ impl RunSummary {
             true => name_of(&folder),
             false => info.name,
         };
-        Some(Self { folder, name, steps, objects, is_training, changed, counted, psnr })
+        Some(Self { folder, name, steps, objects, is_training, changed, holder, counted, psnr })
     }
 
     /// Returns text such as "run-1: 600 steps, 26.6 dB, 13 objects".
@@ -58,11 +66,14 @@ impl RunSummary {
 
     /// Returns text such as "600 steps, 26.6 dB, 13 objects".
     pub(crate) fn facts(&self) -> String {
-        self.lines().join(", ")
+        self.lines().into_iter().filter(|line| !line.is_empty()).collect::<Vec<_>>().join(", ")
     }
 
     /// Returns the same as two lines: of the training, and of the objects.
     pub(crate) fn lines(&self) -> [String; 2] {
+        if self.changed.is_none() {
+            return ["not saved yet".to_owned(), String::new()];
+        }
         let quality = self.psnr.map_or_else(String::new, |psnr| format!(", {psnr:.1} dB"));
         let objects = if self.objects == 0 { "no objects".to_owned() } else { self.counted.clone() };
         [format!("{}{quality}", format::things(self.steps as usize, "step")), objects]
@@ -107,7 +118,27 @@ pub(crate) fn delete(folders: &Folders, run: &Path) -> Result<(), JobError> {
     if !folders.keeps(run) {
         return Err(JobError::NoScene(run.into()));
     }
-    SceneFolder::delete_all(run)?;
+    delete_with(folders, run, SceneFolder::delete_all)
+}
+
+/// Deletes the scene in `folder`: with everything in its folder if this program keeps it, else only if nothing but the
+/// scene is there, in the state `known`.
+///
+/// # Errors
+/// If there is anything else, the scene was changed, or a process writes to it; nothing is deleted then.
+pub(crate) fn delete_scene(folders: &Folders, folder: &Path, known: Option<&str>) -> Result<(), JobError> {
+    if folders.keeps(folder) {
+        return delete(folders, folder);
+    }
+    delete_with(folders, folder, |folder| SceneFolder::delete(folder, known))
+}
+
+fn delete_with(
+    folders: &Folders,
+    run: &Path,
+    delete: impl FnOnce(&Path) -> Result<(), IoError>,
+) -> Result<(), JobError> {
+    delete(run)?;
     // A picture of nothing is not shown.
     let _ = fs::remove_file(folders.picture(run));
     Ok(())
@@ -116,8 +147,6 @@ pub(crate) fn delete(folders: &Folders, run: &Path) -> Result<(), JobError> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::io::IoError;
-    use crate::io::trained::SceneInfo;
     use crate::scene::{Evaluation, GaussianCloud, Identities, Level, NO_IDENTITY, SemanticMap};
 
     fn save(folders: &Folders, root: &Path, steps: u64) -> PathBuf {
@@ -172,6 +201,12 @@ mod tests {
         fs::create_dir_all(first.join("report")).expect("created");
         fs::write(first.join("report/report.json"), "{}").expect("written");
         let held = SceneFolder::hold(&first, "training").expect("held");
+        let third = SceneFolder::hold(&folders.fresh(root), "training").expect("held");
+        let all = list(&folders, root);
+        assert_eq!(all.iter().map(|run| run.holder.is_some()).collect::<Vec<_>>(), [true, false, true]);
+        assert_eq!(all[2].text(), "run-3: not saved yet");
+        fs::remove_dir_all(third.path()).expect("gone");
+        drop(third);
         let e = delete(&folders, &first).expect_err("it is being trained");
         assert!(matches!(e, JobError::Io(IoError::Busy { .. })) && e.to_string().contains("training"), "{e}");
         assert!(first.join(SCENE_FILE).exists() && first.join("report/report.json").exists());

@@ -62,6 +62,15 @@ pub struct TrainedRun {
     pub(crate) facts: SceneFacts,
 }
 
+/// Change of a scene's folder that another program made.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) enum ChangeElsewhere {
+    /// Another state was saved; its id.
+    Saved(Option<String>),
+    /// The folder is no scene any more.
+    Gone,
+}
+
 impl Workspace {
     /// Keeps what it makes in `folders`.
     pub fn new(folders: Folders) -> Self {
@@ -190,6 +199,23 @@ impl Workspace {
     /// Stores the length of a unit of the scene in `out`. Returns false if there is no scene to store it with.
     pub(crate) fn set_scale(&self, out: &Path, meters_per_unit: f64) -> Result<bool, JobError> {
         scale::store(out, self.known(out).as_deref(), meters_per_unit)
+    }
+
+    /// Deletes the scene in `folder`, in the state that is known of it.
+    ///
+    /// # Errors
+    /// As [`runs::delete_scene`].
+    pub(crate) fn delete(&self, folder: &Path) -> Result<(), JobError> {
+        runs::delete_scene(&self.folders, folder, self.known(folder).as_deref())
+    }
+
+    /// Returns how the scene in `folder` differs from its known state, if it does.
+    pub(crate) fn changed_elsewhere(&self, folder: &Path) -> Option<ChangeElsewhere> {
+        let known = self.known.lock().unwrap_or_else(PoisonError::into_inner).get(folder).cloned()?;
+        match trained::load_info(folder) {
+            Ok(info) => (info.state != known).then_some(ChangeElsewhere::Saved(info.state)),
+            Err(_) => (!trained::is_scene(folder)).then_some(ChangeElsewhere::Gone),
+        }
     }
 
     fn opened(&self, mut scene: OpenedScene) -> OpenedScene {

@@ -44,6 +44,14 @@ impl Bounds {
         (self.min + self.max) * 0.5
     }
 
+    /// The corners: bit 0, 1 or 2 of an index is set where x, y or z is that of the largest.
+    pub(crate) fn corners(&self) -> [DVec3; 8] {
+        let Self { min, max } = self;
+        std::array::from_fn(|i| {
+            DVec3::from_array(std::array::from_fn(|axis| if i >> axis & 1 == 1 { max[axis] } else { min[axis] }))
+        })
+    }
+
     pub(crate) fn size(&self) -> DVec3 {
         self.max - self.min
     }

@@ -27,7 +27,7 @@ use super::theme;
 use super::toasts::Toasts;
 use super::viewport::Viewport;
 use crate::jobs::Folders;
-use crate::jobs::workspace::Workspace;
+use crate::jobs::workspace::{ChangeElsewhere, Workspace};
 use crate::pipeline::observer::Observer;
 use crate::remote::ServerLink;
 use crate::scene::plan::PlanOverride;
@@ -85,6 +85,8 @@ pub struct App {
     /// The conversation with the agent.
     pub(crate) chat: Chat,
     pub(super) measured: StoredMeasurements,
+    /// The last change by another program that the user was asked about, with the number of its scene.
+    pub(super) seen_elsewhere: Option<(u64, ChangeElsewhere)>,
     pub(super) toasts: Toasts,
     pub(super) actions: Vec<Action>,
     /// Window time of the last frame, s.
@@ -152,6 +154,7 @@ impl App {
             camera: CameraPane::default(),
             chat: Chat::default(),
             measured: StoredMeasurements::default(),
+            seen_elsewhere: None,
             toasts: Toasts::default(),
             last_frame: 0.0,
             traced: 0,

@@ -42,6 +42,14 @@ const OFFERS: &[(&[&str], Offered)] = &[
     ),
     (
         &[
+            "video|movie|film|gif|animation|camera|turntable|flight around|of {}",
+            "fly|orbit|circle|go|goes|turn|spin|move|walk around {}",
+            "orbit|circle|turntable {}",
+        ],
+        OnThing(|id| Action::Turntable(Some(id))),
+    ),
+    (
+        &[
             "video",
             "movie",
             "animation",
@@ -240,12 +248,14 @@ mod tests {
             ("make the red controller green", Action::Transform(5)),
             ("I want the bear to be purple: paint it", Action::Transform(7)),
             ("change the color of the kettle", Action::Transform(1)),
-            ("now a camera move that circles the bear", Action::ShowPane(Pane::Camera)),
+            ("now a camera move that circles the bear", Action::Turntable(Some(7))),
             ("move the kettle next to the camera please", Action::Transform(1)),
             ("recolor something", Action::ShowPane(Pane::Objects)),
             ("rotate the teddy bear by 90 degrees", Action::Transform(7)),
             ("duplicate the lid of the kettle", Action::Transform(2)),
-            ("make a video that goes around the bear", Action::ShowPane(Pane::Camera)),
+            ("make a video that goes around the bear", Action::Turntable(Some(7))),
+            ("fly around the kettle", Action::Turntable(Some(1))),
+            ("make a video that goes around", Action::ShowPane(Pane::Camera)),
             ("record a short movie of all this", Action::ShowPane(Pane::Camera)),
             ("export the kettle as glb", Action::ExportTarget(1)),
             ("write the whole scene to a spz", Action::ExportPly),

@@ -1,14 +1,14 @@
 //! Dialogs: errors, and questions before a loss.
 
-use egui::RichText;
+use egui::{Button, RichText};
 
 use super::ctx::Ctx;
 use super::state::{ErrorBox, Tone};
-use super::theme;
+use super::{main_button, theme};
 use crate::scene::text;
 use crate::ui::actions::Action;
 
-/// A question before data or a running job is lost.
+/// A question before data or a running job is lost. Declining is the safe answer: its button has the focus, and `Enter`.
 pub(crate) struct Question {
     pub(crate) text: String,
     /// Button to proceed.
@@ -17,7 +17,7 @@ pub(crate) struct Question {
     pub(crate) other: Option<&'static str>,
     /// Button to decline.
     pub(crate) no: &'static str,
-    /// True if `yes` deletes something for good: its button is red.
+    /// True if `yes` deletes or replaces something for good: its button is red.
     pub(crate) deletes: bool,
 }
 
@@ -68,17 +68,21 @@ pub(crate) fn show_error(ctx: &egui::Context, error: &ErrorBox, cx: &mut Ctx<'_>
 impl Question {
     /// Shows the question; returns the answer, once there is one.
     pub(crate) fn show(&self, ctx: &egui::Context) -> Option<DialogAnswer> {
+        let is_new = main_button::has_just_opened(ctx, "dialog question");
         let response = theme::dialog("dialog question").show(ctx, |ui| {
             ui.set_width(420.0);
             egui::ScrollArea::vertical().max_height(260.0).show(ui, |ui| ui.label(text::lines(&self.text)));
             ui.add_space(12.0);
             ui.horizontal(|ui| {
-                let button = if self.deletes { theme::delete_button } else { theme::primary_button };
-                let answers = [
-                    (ui.add(button(self.yes)).clicked(), DialogAnswer::Yes),
-                    (self.other.is_some_and(|other| ui.button(other).clicked()), DialogAnswer::Other),
-                    (ui.button(self.no).clicked(), DialogAnswer::No),
-                ];
+                let yes = if self.deletes { theme::delete_button(self.yes) } else { Button::new(self.yes) };
+                let yes = ui.add(yes).clicked();
+                let other = self.other.is_some_and(|other| ui.button(other).clicked());
+                let no = ui.add(theme::primary_button(self.no));
+                if is_new {
+                    no.request_focus();
+                }
+                let answers =
+                    [(yes, DialogAnswer::Yes), (other, DialogAnswer::Other), (no.clicked(), DialogAnswer::No)];
                 answers.into_iter().find(|(is_clicked, _)| *is_clicked).map(|(_, answer)| answer)
             })
             .inner
@@ -87,9 +91,10 @@ impl Question {
     }
 }
 
-/// Shows a question of two answers. `Some(true)` to proceed, `Some(false)` to decline, `None` without an answer.
+/// Shows a question of two answers, the first of which replaces or deletes something. `Some(true)` to proceed,
+/// `Some(false)` to decline, `None` without an answer.
 pub(crate) fn show_question(ctx: &egui::Context, text: &str, yes: &'static str, no: &'static str) -> Option<bool> {
-    let question = Question { text: text.to_owned(), yes, other: None, no, deletes: false };
+    let question = Question { text: text.to_owned(), yes, other: None, no, deletes: true };
     question.show(ctx).map(|answer| answer == DialogAnswer::Yes)
 }
 

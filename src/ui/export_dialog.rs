@@ -6,7 +6,7 @@ use crossbeam_channel::{Receiver, bounded};
 use egui::{Align, Context, Layout, RichText, ScrollArea, Ui, vec2};
 use strum::VariantArray;
 
-use super::theme;
+use super::{main_button, theme};
 use crate::io::splat_format::SplatFormat;
 use crate::jobs::export_forecast::{self, SplatForecast};
 use crate::math::format;
@@ -56,7 +56,8 @@ pub(super) struct ExportDialog {
     news: Receiver<SplatForecast>,
     /// The job that measures; `None` if too many jobs wait.
     task: Option<Task<()>>,
-    is_new: bool,
+    /// True if the list scrolls to the format.
+    follows: bool,
 }
 
 impl ExportDialog {
@@ -76,7 +77,7 @@ impl ExportDialog {
         };
         let task = tasks.spawn(JobInfo::short("Measuring formats").aside(), measure).ok();
         let (format, forecasts) = (SplatFormat::Ply, Vec::new());
-        Self { offered, scope, cloud, format, forecasts, news, task, is_new: true }
+        Self { offered, scope, cloud, format, forecasts, news, task, follows: false }
     }
 
     /// Ends measuring.
@@ -114,10 +115,8 @@ impl ExportDialog {
             ui.add_space(8.0);
             let [saves, closes] = ui
                 .horizontal(|ui| {
-                    let save = ui.add(theme::primary_button("Save\u{2026}"));
-                    if std::mem::take(&mut self.is_new) {
-                        save.request_focus();
-                    }
+                    let (save, steps) = main_button::stepping_button(ui, "export", "Save\u{2026}", true);
+                    self.step(steps);
                     [save.clicked(), ui.button("Cancel").clicked()]
                 })
                 .inner;
@@ -147,6 +146,15 @@ impl ExportDialog {
         changed
     }
 
+    /// Chooses a format some places below, of those that can be written.
+    fn step(&mut self, steps: isize) {
+        let fails = |format: &SplatFormat| self.forecasts.iter().any(|f| f.format == *format && f.written.is_err());
+        let can: Vec<SplatFormat> = SplatFormat::VARIANTS.iter().copied().filter(|format| !fails(format)).collect();
+        if steps != 0 {
+            (self.format, self.follows) = (main_button::stepped(&can, self.format, steps), true);
+        }
+    }
+
     fn formats(&mut self, ui: &mut Ui) {
         for &format in SplatFormat::VARIANTS {
             let found = self.forecasts.iter().find(|one| one.format == format).map(|one| &one.written);
@@ -173,6 +181,9 @@ impl ExportDialog {
                 let button = egui::RadioButton::new(self.format == format, format.title());
                 let radio = theme::outlined(ui, |ui| ui.add_enabled(can_write, button));
                 clicked = radio.clicked();
+                if self.format == format && std::mem::take(&mut self.follows) {
+                    radio.scroll_to_me(None);
+                }
                 let values = format!("{}: size {size}, loss {loss}", format.title());
                 radio.on_hover_text(format.rounding().map_or_else(|| values.clone(), |r| format!("Rounded: {r}.")))
             };

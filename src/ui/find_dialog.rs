@@ -37,8 +37,11 @@ pub(crate) struct Means {
 }
 
 impl FindDialog {
-    pub(crate) fn open(&mut self) {
+    /// Opens the dialog with the models of the last search.
+    pub(crate) fn open(&mut self, last: &FindSettings) {
         self.open = true;
+        self.segmenter = last.segmenter.clone().or(self.segmenter.take());
+        self.encoder = last.encoder.clone().or(self.encoder.take());
     }
 
     pub(crate) fn is_open(&self) -> bool {
@@ -96,10 +99,13 @@ impl FindDialog {
     }
 
     /// The chosen models, completed by the best installed ones.
-    fn means(&self, known: &ModelList) -> Means {
+    pub(crate) fn means(&self, known: &ModelList) -> Means {
         let best = |role: ModelRole| known.best(role).map(|e| e.id.clone());
-        let segmenter = self.segmenter.clone().or_else(|| best(ModelRole::Segmenter)).unwrap_or_else(|| REGIONS.into());
-        let encoder = self.encoder.clone().or_else(|| best(ModelRole::Encoder)).unwrap_or_else(|| NO_ENCODER.into());
+        // A model of an earlier use may be in no list any more.
+        let is_offered = |id: &String| [REGIONS, NO_ENCODER].contains(&id.as_str()) || known.get(id).is_some();
+        let chosen = |id: &Option<String>, role| id.clone().filter(is_offered).or_else(|| best(role));
+        let segmenter = chosen(&self.segmenter, ModelRole::Segmenter).unwrap_or_else(|| REGIONS.into());
+        let encoder = chosen(&self.encoder, ModelRole::Encoder).unwrap_or_else(|| NO_ENCODER.into());
         let is_missing = |id: &&String| known.get(id).is_some_and(|(_, s)| !s.is_usable());
         let networks = [&segmenter, &encoder];
         let needs_engine = networks.iter().any(|id| known.get(id).is_some_and(|(e, _)| !e.built_in));

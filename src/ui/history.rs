@@ -229,7 +229,7 @@ fn described(before: &ViewState, now: &ViewState, all: Option<&Identities>) -> S
         return if now.split { "split the view" } else { "ended the split view" }.to_owned();
     }
     if before.dim != now.dim {
-        return if now.dim { "dimmed the rest" } else { "ended dimming" }.to_owned();
+        return if now.dim { "dimmed everything else" } else { "ended dimming" }.to_owned();
     }
     if before.cameras != now.cameras {
         return format!("{} the cameras", if now.cameras { "showed" } else { "hid" });

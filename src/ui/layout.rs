@@ -67,6 +67,8 @@ pub struct Layout {
     pub(crate) zoom: f32,
     /// True if the photos' cameras are drawn into the view.
     pub cameras: bool,
+    /// True if kept measurements are drawn into the view, also while nothing is measured.
+    pub measurements: bool,
     /// True if the photo is shown beside the frame.
     pub compare: bool,
     /// Position of the split between frame and photo, 0 to 1.
@@ -108,6 +110,7 @@ impl Default for Layout {
             theme: ThemePreference::Dark,
             zoom: 1.0,
             cameras: true,
+            measurements: false,
             compare: false,
             split: 0.5,
             mode: ViewMode::Rgb,

@@ -52,6 +52,14 @@ pub(crate) fn named_actions(all: &Identities, id: IdentityId) -> Vec<(Action, St
     rows(all, id).into_iter().filter_map(named).collect()
 }
 
+/// The action with a key that does the same as this one of the selected thing.
+pub(crate) fn keyed(all: &Identities, id: IdentityId, action: &Action) -> Option<Action> {
+    rows(all, id).into_iter().find_map(|row| match row {
+        Row::Do(own, _, keyed) if own == *action => keyed,
+        _ => None,
+    })
+}
+
 /// Draws the menu under the thing's name.
 pub(crate) fn show(ui: &mut Ui, all: &Identities, id: IdentityId, cx: &mut Ctx<'_>) {
     ui.label(RichText::new(text::elided(&cx.state.labels.full_name(all, id), 48)).strong());

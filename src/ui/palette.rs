@@ -73,8 +73,9 @@ impl Palette {
                     ui.weak("No matching action.");
                 }
                 for (i, (action, title)) in found.iter().enumerate() {
+                    let keyed = selection.and_then(|(all, id)| object_menu::keyed(all, id, action));
                     let row = egui::Button::selectable(i == self.selected, title)
-                        .shortcut_text(keys::label(ui.ctx(), action))
+                        .shortcut_text(keys::label(ui.ctx(), keyed.as_ref().unwrap_or(action)))
                         .min_size(egui::vec2(ui.available_width(), 28.0));
                     let row = ui.add(row).on_hover_text(action.tooltip());
                     if i == self.selected && (entered || edit.changed() || step_keys(ui)) {
@@ -105,8 +106,8 @@ fn title(action: &Action) -> String {
     }
 }
 
-/// Actions whose titles hold every word of the query, those that begin with it first. A query that looks like a path
-/// gives only the action that opens it.
+/// Actions whose titles hold every word of the query: those that begin with it, then those with words that begin so, then
+/// those with the letters anywhere. A query that looks like a path gives only the action that opens it.
 fn matches(query: &str, layout: &Layout, selection: Option<(&Identities, IdentityId)>) -> Vec<(Action, String)> {
     let path = query.trim();
     if path.starts_with(['/', '.', '~']) || path.contains(":\\") {
@@ -133,14 +134,29 @@ fn matches(query: &str, layout: &Layout, selection: Option<(&Identities, Identit
         Action::ShowPane(pane) | Action::TogglePane(pane) => pane.text().to_lowercase().starts_with(&query),
         _ => false,
     };
-    found.sort_by_key(|(a, title)| !title.to_lowercase().starts_with(&query) && !is_pane(a));
+    found.sort_by_key(|(action, title)| {
+        let title = title.to_lowercase();
+        if title.starts_with(&query) || is_pane(action) {
+            return 0;
+        }
+        let text = format!("{title} {}", other_words(action));
+        if words.iter().all(|word| begins_a_word(&text, word)) { 1 } else { 2 }
+    });
     found
+}
+
+/// True if one of the words of a text begins with these letters.
+fn begins_a_word(text: &str, letters: &str) -> bool {
+    let is_begin = |at: usize| !text[..at].ends_with(char::is_alphanumeric);
+    text.match_indices(letters).any(|(at, _)| is_begin(at))
 }
 
 /// Synonyms in an action's title.
 fn other_words(action: &Action) -> &'static str {
     match action {
         Action::ShowPane(_) => "open",
+        Action::LookFrom(_) => "view",
+        Action::Remove(_) => "delete",
         Action::TogglePane(_) => "close",
         _ => "",
     }
@@ -241,6 +257,43 @@ mod tests {
         assert_eq!(found("train start"), vec![Action::StartTraining]);
         assert_eq!(found("open").first(), Some(&Action::OpenFolder));
         assert!(found("no such thing").is_empty());
+    }
+
+    #[test]
+    fn the_beginning_of_a_word_beats_letters_within_one() {
+        let mut all = Identities::default();
+        let mug = all.add(Level::Object, NO_IDENTITY, vec!["mug".into()]);
+        let first = |query: &str| matches(query, &Layout::default(), Some((&all, mug))).swap_remove(0).1;
+        for (query, title) in [
+            ("top", "Look from the top"),
+            ("move", "Move, turn or recolor: mug"),
+            ("export", "Export Gaussians: mug"),
+            ("crop", "Crop box"),
+            ("dark", "Dark theme"),
+            ("ortho", "Orthographic view"),
+            ("undo", "Undo"),
+            ("video", "Export video\u{2026}"),
+            ("mask", "Find objects with other masks\u{2026}"),
+            ("photo", "Show the photos pane"),
+            ("delete", "Delete this scene\u{2026}"),
+            ("view top", "Look from the top"),
+        ] {
+            assert_eq!(first(query), title, "{query}");
+        }
+        let of = |query: &str| matches(query, &Layout::default(), Some((&all, mug)));
+        assert!(of("delete").iter().any(|(action, _)| *action == Action::Remove(mug)));
+        // Control: letters within words are found, too, at the end.
+        assert_eq!(of("top").last().map(|(action, _)| action), Some(&Action::EndComparison));
+    }
+
+    #[test]
+    fn rows_of_the_selection_have_the_keys_of_the_menu() {
+        let mut all = Identities::default();
+        let mug = all.add(Level::Object, NO_IDENTITY, vec!["mug".into()]);
+        let keyed = |action| object_menu::keyed(&all, mug, &action);
+        assert_eq!(keyed(Action::Hide(mug)), Some(Action::HideSelected));
+        assert_eq!(keyed(Action::RenameThis(mug)), Some(Action::Rename));
+        assert_eq!([keyed(Action::Transform(mug)), keyed(Action::Hide(mug + 1))], [None, None]);
     }
 
     #[test]

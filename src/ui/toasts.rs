@@ -7,7 +7,7 @@ use egui::{Align, Align2, Area, Button, Frame, Id, Label, Layout, Margin, Order,
 use super::state::{AppState, Toast, Tone};
 use super::theme;
 
-/// Display time of a message, s; longer for warnings. Errors stay.
+/// Display time of a message, s; longer for warnings and figures, which take time to read. Errors stay.
 const STAY_SECS: f64 = 4.0;
 const STAY_LONG_SECS: f64 = 9.0;
 /// Width of the line where it floats over a view that fills the window, points.
@@ -33,7 +33,8 @@ impl Toasts {
         let mut next = f64::INFINITY;
         state.toasts.retain(|toast| {
             let left = match toast.tone {
-                Tone::Info | Tone::Good => STAY_SECS,
+                Tone::Info | Tone::Good if !toast.text.contains(|c: char| c.is_ascii_digit()) => STAY_SECS,
+                Tone::Info | Tone::Good => STAY_LONG_SECS,
                 Tone::Warning => STAY_LONG_SECS,
                 Tone::Error => return !log_is_open,
             } - (now - *self.since.entry(toast.id).or_insert(now));
@@ -115,6 +116,20 @@ mod tests {
         assert!(left(&mut toasts, &mut state, 10.5, false).is_empty());
         // Control: the log keeps every one of them.
         assert_eq!(state.log.len(), 5);
+    }
+
+    #[test]
+    fn a_message_with_figures_stays_longer_and_in_the_log() {
+        let (mut toasts, mut state) = (Toasts::default(), AppState::default());
+        state.toast(Tone::Good, "Held-out PSNR 26.56 dB, SSIM 0.812");
+        assert_eq!(left(&mut toasts, &mut state, 1.0, false).len(), 1);
+        assert_eq!(left(&mut toasts, &mut state, 8.0, false).len(), 1);
+        assert!(left(&mut toasts, &mut state, 10.5, false).is_empty());
+        assert_eq!(state.log.len(), 1);
+        // Control: one without figures is gone by then.
+        state.toast(Tone::Good, "Showed everything");
+        assert_eq!(left(&mut toasts, &mut state, 11.0, false).len(), 1);
+        assert!(left(&mut toasts, &mut state, 18.0, false).is_empty());
     }
 
     #[test]

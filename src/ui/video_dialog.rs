@@ -3,8 +3,8 @@
 use egui::{Context, DragValue, RichText, Slider, Ui};
 use strum::VariantArray;
 
-use super::theme;
 use super::video_choice::{VideoAspect, VideoChoice, VideoFile, VideoHeight};
+use super::{main_button, theme};
 use crate::math::format;
 
 /// Largest sides of an MP4's frames, px, and highest rate of a GIF.
@@ -52,7 +52,9 @@ pub(super) fn show(ctx: &Context, choice: &mut VideoChoice, fps: &mut f64, facts
         why.iter().for_each(|why| drop(ui.colored_label(theme::warning(), why)));
         ui.add_space(8.0);
         ui.horizontal(|ui| {
-            let goes = ui.add_enabled(why.is_none(), theme::primary_button("Save\u{2026}")).clicked();
+            let (save, steps) = main_button::stepping_button(ui, "video", "Save\u{2026}", why.is_none());
+            choice.file = main_button::stepped(VideoFile::VARIANTS, choice.file, steps);
+            let goes = save.clicked();
             let closes = ui.button("Cancel").clicked();
             (goes || closes).then_some(goes)
         })

@@ -6,6 +6,7 @@
 use crossbeam_channel::{Receiver, Sender, TryRecvError, bounded};
 
 use super::failure::{Failure, Stop};
+use crate::jobs::phases::WholeProgress;
 
 /// Identifier of a job: local to one worker, or of a job on another computer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -43,7 +44,7 @@ pub enum Makes {
 }
 
 /// Description of a job for the worker, the status bar and the log.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct JobInfo {
     /// Title, such as "Opening fox".
     pub title: String,
@@ -54,6 +55,8 @@ pub struct JobInfo {
     pub(crate) is_aside: bool,
     /// Sentence for a user who waits for it.
     pub(crate) hint: &'static str,
+    /// Progress over its phases, before it has begun.
+    pub(crate) whole: WholeProgress,
 }
 
 impl JobInfo {
@@ -86,6 +89,11 @@ impl JobInfo {
 
     pub(crate) fn hint(self, hint: &'static str) -> Self {
         Self { hint, ..self }
+    }
+
+    /// The job with one progress over its phases, which are a list of [`crate::jobs::phases`].
+    pub(crate) fn phases(self, phases: &'static [(&'static str, f64)]) -> Self {
+        Self { whole: WholeProgress::of(phases), ..self }
     }
 }
 

@@ -2,6 +2,7 @@
 //! every word of it; else nothing is done, and the nearest commands are shown.
 
 mod complete;
+mod example;
 mod form;
 mod task;
 
@@ -10,6 +11,7 @@ pub use complete::complete;
 
 use std::collections::VecDeque;
 
+use self::example::example;
 use self::form::{FormItem, FormRequest, Slots, Things, beginning_with, sequences};
 use self::task::{CommandStep, task};
 use super::camera_args::{CLOSENESS, CLOSER, Direction, Distance, FARTHER, NORMAL};
@@ -27,7 +29,6 @@ use crate::math::format::capital;
 use crate::navigate::target::Side;
 use crate::pipeline::semantics::query::language;
 use crate::pipeline::semantics::query::language::words::LanguageWords;
-use crate::scene::identity::name_words::words as name_words;
 use crate::scene::{Identities, LevelFilter};
 
 /// Maximum number of tasks per request.
@@ -306,14 +307,6 @@ fn all_of(phrase: &str, world: &mut dyn World, dialog: &DialogState) -> Result<O
         Resolved::Missing { refusal, .. } => return Err(refusal),
     };
     Ok(Some(ids))
-}
-
-/// Example of a command with a name of this scene.
-fn example(command: &CommandHelp, identities: &Identities, request: &[&str]) -> String {
-    let names = || identities.iter().filter_map(|(_, i)| i.names.first());
-    let spoken = names().find(|n| name_words(n).iter().all(|w| request.iter().any(|r| name_words(r).contains(w))));
-    let name = spoken.or_else(|| names().next()).map_or("lamp", String::as_str);
-    command.example.replace("{}", name)
 }
 
 /// Commands nearest to a request: the first word counts most, then other shared words.

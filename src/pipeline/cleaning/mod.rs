@@ -10,7 +10,6 @@ mod support;
 
 use rayon::prelude::*;
 
-use self::neighbors::SplatNeighbors;
 pub(crate) use self::rules::{CleanRule, RuleError};
 use crate::io::{self, IoError};
 use crate::math::Real;
@@ -120,7 +119,6 @@ pub(crate) struct CloudMeasures {
     floaters: Vec<bool>,
     /// View-independent colors, 0 to 1 as displayed.
     colors: Vec<[f32; 3]>,
-    near: SplatNeighbors,
     /// Half the diagonal of the scene without stray Gaussians, scene units.
     radius: f64,
 }
@@ -132,14 +130,8 @@ impl CloudMeasures {
             of.iter().zip(gone).filter(|(_, gone)| !**gone).map(|(v, _)| *v).collect()
         }
         let values = self.values.iter().map(|(measure, values)| (*measure, left(values, gone))).collect();
-        let near = self.near.without(gone);
         let (floaters, colors) = (left(&self.floaters, gone), left(&self.colors, gone));
-        Self { values, floaters, colors, near, radius: self.radius }
-    }
-
-    /// Nearest neighbors of each Gaussian.
-    pub(crate) fn neighbors(&self) -> &SplatNeighbors {
-        &self.near
+        Self { values, floaters, colors, radius: self.radius }
     }
 
     /// Values of a measure, `[n]`; `None` without the photos that it needs.
@@ -190,8 +182,7 @@ pub(crate) fn measure(
         values.extend(support.error.map(|error| (SplatMeasure::Error, error)));
     }
     values.push((SplatMeasure::Size, sizes));
-    let near = SplatNeighbors::nearest(&neighbors);
-    Ok(CloudMeasures { values, floaters, colors: colors(cloud), near, radius })
+    Ok(CloudMeasures { values, floaters, colors: colors(cloud), radius })
 }
 
 /// View-independent colors, 0 to 1 as displayed.

@@ -24,25 +24,8 @@ impl SplatNeighbors {
     /// # Errors
     /// If the observer cancels.
     pub(crate) fn new(cloud: &GaussianCloud, observer: &mut dyn Observer) -> Result<Self, Interrupted> {
-        Ok(Self::nearest(&search(cloud, observer)?))
-    }
-
-    /// Neighbors without their distances.
-    pub(super) fn nearest(found: &[Vec<(u32, f32)>]) -> Self {
         let first = |of: &Vec<(u32, f32)>| std::array::from_fn(|k| of.get(k).map_or(NONE, |n| n.0));
-        Self(found.iter().map(first).collect())
-    }
-
-    /// Neighbors among the Gaussians that are not `gone`.
-    pub(super) fn without(&self, gone: &[bool]) -> Self {
-        let mut number = Vec::with_capacity(gone.len());
-        let mut next = 0;
-        for gone in gone {
-            number.push(if *gone { NONE } else { next });
-            next += u32::from(!gone);
-        }
-        let renumbered = |near: &[u32; NEIGHBORS]| near.map(|j| number.get(j as usize).copied().unwrap_or(NONE));
-        Self(self.0.iter().zip(gone).filter(|(_, gone)| !**gone).map(|(near, _)| renumbered(near)).collect())
+        Ok(Self(search(cloud, observer)?.iter().map(first).collect()))
     }
 
     /// Adds all neighbors of the selected Gaussians to a selection.

@@ -13,7 +13,7 @@ use super::{EventSink, LinkCommand, LinkUpdate, SessionEnd, lock, new_job};
 use crate::io::IoError;
 use crate::jobs::open::{Origin, received};
 use crate::jobs::workspace::TrainedRun;
-use crate::jobs::{Folders, OpenedScene, plan};
+use crate::jobs::{Folders, OpenedScene, phases, plan};
 use crate::pipeline::observer::{Evaluation, Severity};
 use crate::pipeline::train::TrainConfig;
 use crate::scene::{GaussianCloud, Machine, SemanticMap, text};
@@ -226,7 +226,8 @@ impl LinkThread {
             let title = format!("{} on {}", text::line(title), self.client.address.host);
             (self.training, self.busy) = (Some(job), true);
             self.evaluations.clear();
-            return self.out.send(Event::Started(job, JobInfo::long(title).makes(Makes::Gaussians).pausable()));
+            let info = JobInfo::long(title).makes(Makes::Gaussians).pausable().phases(phases::TRAINING);
+            return self.out.send(Event::Started(job, info));
         }
         let Some(job) = self.training else { return Ok(()) };
         match event {

@@ -5,6 +5,7 @@ use std::sync::Arc;
 use super::{edits, remote, view};
 use crate::jobs::clean::{self, MeasureRequest};
 use crate::jobs::edit::EditRequest;
+use crate::jobs::phases;
 use crate::jobs::rearrange::SplatEdit;
 use crate::jobs::select::SelectFor;
 use crate::math::format;
@@ -65,7 +66,7 @@ pub(in crate::ui) fn measure_splats(app: &mut App) {
     app.layout.show(Pane::Clean);
     let request = MeasureRequest { path: scene.stored().to_path_buf(), cloud: Arc::clone(&cloud) };
     let measure = move |observer: &mut dyn Observer| clean::measured(request, observer);
-    let info = JobInfo::long("Measuring Gaussians").pausable();
+    let info = JobInfo::long("Measuring Gaussians").pausable().phases(phases::CLEANING);
     app.clean.measuring = app.start_to_end(info, measure, |app, _, measured| {
         app.clean.measuring = false;
         if let Ok(measured) = measured {
@@ -81,9 +82,12 @@ pub(in crate::ui) fn refine_chosen(app: &mut App) {
     app.viewport.select_from(SelectFor::New(NO_IDENTITY), Some(SelectShape::Brush), first, &app.state);
 }
 
-/// Deletes the selected Gaussians: those of the tool, else those of the Clean pane.
+/// Deletes the selected Gaussians: those of the selection tool while it is in use, else those of the Clean pane.
 pub(in crate::ui) fn delete_chosen(app: &mut App) {
-    let selected = app.viewport.selected_gaussians().map(<[u32]>::to_vec).or_else(|| app.clean.chosen());
+    let selected = match app.viewport.is_selecting() {
+        true => app.viewport.selected_gaussians().map(<[u32]>::to_vec),
+        false => app.clean.chosen(),
+    };
     let Some((selected, cloud)) = selected.zip(app.viewport.cloud()) else {
         return app.state.toast(Tone::Info, "No Gaussians are selected: select some in the view or in the Clean pane.");
     };

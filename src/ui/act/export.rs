@@ -10,7 +10,7 @@ use crate::io::splat_format::SplatFormat;
 use crate::jobs::export_all::{ExportAllRequest, MaskFormat};
 use crate::jobs::page::PageRequest;
 use crate::jobs::video::VideoRequest;
-use crate::jobs::{export, export_all, page as page_job, video as video_job};
+use crate::jobs::{export, export_all, page as page_job, phases, video as video_job};
 use crate::render::BackendChoice;
 use crate::ui::app::App;
 use crate::ui::camera;
@@ -49,7 +49,7 @@ pub(in crate::ui) fn all_objects(app: &mut App) {
         let photos = scene.dataset.iter().flat_map(|d| &d.photos);
         let views = photos.map(|p| (p.name.clone(), p.camera.clone())).collect();
         let (masks, format) = (MaskFormat::ALL.to_vec(), SplatFormat::Ply);
-        let info = JobInfo::long(format!("Writing {}", file_name(&folder))).pausable();
+        let info = JobInfo::long(format!("Writing {}", file_name(&folder))).pausable().phases(phases::EXPORT_ALL);
         let (cloud, map) = (Arc::clone(&cloud), Arc::clone(&map));
         let request = ExportAllRequest { cloud, map, settings, views, format, masks, folder };
         app.start(info, move |observer| export_all::run(&request, observer).map(|done| done.folder), is_saved);

@@ -4,11 +4,12 @@ use std::sync::Arc;
 
 use strum::VariantArray;
 
-use super::export::{has_view, is_saved, scene_name};
+use super::export::{has_view, scene_name};
 use super::open::file_name;
 use crate::io::splat_format::SplatFormat;
 use crate::jobs::export;
 use crate::jobs::export_splat::{self, LossViews};
+use crate::jobs::phases;
 use crate::math::format;
 use crate::pipeline::observer::Observer;
 use crate::scene::{GaussianCloud, IdentityId};
@@ -47,7 +48,7 @@ pub(in crate::ui) fn crop(app: &mut App) {
         return;
     }
     if app.viewport.visibility.crop().is_none() {
-        return app.state.toast(Tone::Info, "There is no crop box yet: press B.");
+        return app.state.toast(Tone::Info, "There is no crop box yet: press B, and drag its faces.");
     }
     open(app, ExportScope::Crop);
 }
@@ -129,12 +130,16 @@ fn save(app: &mut App, dialog: &ExportDialog) {
     let request = FileRequest::save(FileKind::Gaussians, "Export Gaussians", dialog.stem(), formats);
     let cloud = Arc::clone(&dialog.cloud);
     app.choose(request.with_format(format), |app, path| {
-        let info = JobInfo::short(format!("Writing {}", file_name(&path)));
+        let info = JobInfo::short(format!("Writing {}", file_name(&path))).phases(phases::EXPORT);
         let write = move |observer: &mut dyn Observer| {
             let views = LossViews::of_cloud(&cloud);
-            export_splat::run(&cloud, &path, Some(&views), observer)?.tell_loss(observer);
-            Ok::<_, crate::jobs::JobError>(path)
+            let written = export_splat::run(&cloud, &path, Some(&views), observer)?;
+            written.tell_loss(observer);
+            Ok::<_, crate::jobs::JobError>((path, written.drawn))
         };
-        app.start(info, write, is_saved);
+        app.start(info, write, |app, (path, drawn)| {
+            let loss = drawn.map_or_else(String::new, |drawn| format!(" ({})", drawn.line()));
+            app.state.toast(Tone::Good, format!("Saved to {}{loss}", path.display()));
+        });
     });
 }

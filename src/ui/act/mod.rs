@@ -4,6 +4,7 @@
 
 pub(super) mod edit;
 pub(super) mod edits;
+pub(super) mod elsewhere;
 pub(super) mod export;
 pub(super) mod gaussians;
 pub(super) mod measure;

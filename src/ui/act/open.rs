@@ -6,7 +6,7 @@ use std::sync::Arc;
 use crate::io::unposed::Unposed;
 use crate::jobs::demo::QUESTION;
 use crate::jobs::workspace::OpenedPath;
-use crate::jobs::{JobError, OpenedScene, presets};
+use crate::jobs::{JobError, OpenedScene, phases, presets};
 use crate::measure::{Report, is_report};
 use crate::pipeline::observer::Observer;
 use crate::ui::act::remote;
@@ -44,23 +44,38 @@ pub(in crate::ui) fn open(app: &mut App, path: PathBuf) {
     if path.extension().is_some_and(|e| e == "toml") {
         return preset(app, &path);
     }
+    // A scene beside this one, or made from it, is of the same place.
+    let is_beside = app.state.comparison.as_ref().is_some_and(|other| other.path == path);
+    let is_made_of_it = app.state.removed.as_ref().is_some_and(|removed| removed.folder == path);
+    let is_kin = is_beside || is_made_of_it;
     replace_scene(app, move |app| {
         let (workspace, title) = (Arc::clone(&app.workspace), format!("Opening {}", file_name(&path)));
         let info = JobInfo::urgent(title).makes(Makes::Scene);
         app.start(
             info,
             move |observer| workspace.open(&path, observer),
-            |app, opened| match opened {
-                OpenedPath::Scene(scene) => app.state.opened(*scene, false),
+            move |app, opened| match opened {
+                OpenedPath::Scene(scene) => {
+                    if is_kin || app.state.scene.as_ref().is_some_and(|before| is_same_place(before, &scene)) {
+                        app.viewport.keep_place();
+                    }
+                    app.state.opened(*scene, false);
+                }
                 OpenedPath::Unposed(photos) => app.state.unposed = Some(photos),
             },
         );
     });
 }
 
+/// True if both scenes are results of the same photos.
+fn is_same_place(before: &OpenedScene, now: &OpenedScene) -> bool {
+    before.trained && now.trained && before.dataset_path.is_some() && before.dataset_path == now.dataset_path
+}
+
 /// Finds the camera poses of photos, and opens the result.
 pub(in crate::ui) fn find_poses(app: &mut App, photos: Box<Unposed>) {
-    let info = JobInfo::long(format!("Finding camera poses of {}", file_name(&photos.folder))).makes(Makes::Scene);
+    let title = format!("Finding camera poses of {}", file_name(&photos.folder));
+    let info = JobInfo::long(title).makes(Makes::Scene).phases(phases::POSES);
     let workspace = Arc::clone(&app.workspace);
     open_by(
         app,
@@ -88,7 +103,7 @@ pub(in crate::ui) fn demo(app: &mut App) {
 
 /// Renders the photos of the demo, opens them and trains on them.
 pub(in crate::ui) fn demo_photos(app: &mut App) {
-    let info = JobInfo::long("Rendering the demo scene").makes(Makes::Scene);
+    let info = JobInfo::long("Rendering the demo scene").makes(Makes::Scene).phases(phases::DEMO);
     let info = info.hint("The photos are rendered once; training then starts automatically.");
     let workspace = Arc::clone(&app.workspace);
     open_by(

@@ -56,17 +56,44 @@ pub(in crate::ui) fn ask_to_delete(app: &mut App, run: PathBuf) {
     });
 }
 
-fn delete(app: &mut App, run: PathBuf) {
+/// Asks for confirmation, and deletes the open scene.
+pub(super) fn ask_to_delete_open(app: &mut App) {
+    let Some(scene) = app.state.scene.as_ref().filter(|s| s.is_stored() && s.remote.is_none()) else {
+        let text = "Nothing to delete: the open scene has no folder of its own. Its file is yours to delete.";
+        return app.state.toast(Tone::Warning, text);
+    };
+    if scene.runs.iter().any(|run| run.folder == scene.out) {
+        let run = scene.out.clone();
+        return ask_to_delete(app, run);
+    }
+    if app.state.job.is_some() || app.is_editing() {
+        return app.state.toast(Tone::Warning, "This scene is being worked on; cancel that first (Esc).");
+    }
+    let (folder, name) = (scene.out.clone(), &scene.name);
+    let text = format!(
+        "Delete the scene {name}? Its Gaussians and objects are deleted with its folder. This cannot be undone.\n\n{}",
+        folder.display()
+    );
+    let question = Question { text, yes: "Delete", other: None, no: "Cancel", deletes: true };
+    app.put_question(question, |app, answer| {
+        if answer == DialogAnswer::Yes {
+            delete(app, folder);
+        }
+    });
+}
+
+fn delete(app: &mut App, folder: PathBuf) {
     let workspace = Arc::clone(&app.workspace);
-    let delete = move |_: &mut dyn Observer| runs::delete(workspace.folders(), &run).map(|()| run);
-    app.start(JobInfo::short("Deleting the training"), delete, |app, run| {
-        app.state.toast(Tone::Good, format!("Deleted {}", run.display()));
-        app.state.recent.retain(|path| *path != run);
+    let delete = move |_: &mut dyn Observer| workspace.delete(&folder).map(|()| folder);
+    app.start(JobInfo::short("Deleting the scene"), delete, |app, folder| {
+        app.state.toast(Tone::Good, format!("Deleted {}", folder.display()));
+        app.state.recent.retain(|path| *path != folder);
         app.photos.runs.refresh();
-        let scene = app.state.scene.as_ref().filter(|s| s.out == run);
         // What was deleted is not worked on any more.
-        if let Some(photos) = scene.and_then(|s| s.dataset.as_ref()).map(|d| d.source().to_path_buf()) {
-            app.ask(Action::Open(photos));
+        if let Some(scene) = app.state.scene.as_ref().filter(|s| s.out == folder) {
+            let photos = scene.dataset.as_ref().map(|d| d.source().to_path_buf());
+            let next = photos.filter(|path| path.exists()).or_else(|| app.state.recent.first().cloned());
+            app.ask(next.map_or(Action::OpenDemo, Action::Open));
         }
     });
 }

@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use super::remote;
+use crate::jobs::phases;
 use crate::jobs::report::{self, ReportRequest};
 use crate::jobs::train::{IfChanged, TrainStart};
 use crate::jobs::workspace::TrainingEnd;
@@ -31,23 +32,31 @@ pub(in crate::ui) fn start(app: &mut App, anew: bool, if_changed: IfChanged) {
     let config = app.state.next_training(&app.layout.config);
     app.state.antialias = config.render_settings(None, 1.0).antialias;
     let reached = app.state.continues_at(&config).filter(|_| !anew);
-    app.state.resumable = Some((config.clone(), reached.unwrap_or(0)));
     if remote::refuses(app, &title, "run 'fmlgs train --serve' there") {
         return;
     }
     let from = TrainStart { more_steps: reached.is_some(), objects_of: Some(out.clone()), if_changed };
     let (out, workspace) = (Some(out).filter(|_| !anew), Arc::clone(&app.workspace));
-    let info = JobInfo::long(title).makes(Makes::Gaussians).pausable();
+    let info = JobInfo::long(title).makes(Makes::Gaussians).pausable().phases(phases::TRAINING);
+    let (next, before) = (config.clone(), app.state.before_training(reached));
     let train = move |observer: &mut dyn Observer| workspace.train(&dataset, &config, out, &from, observer);
-    app.start_to_end(info, train, |app, job, end| match end {
+    let started = app.start_to_end(info, train, |app, job, end| match end {
         Ok(TrainingEnd::Trained(run)) => {
             if app.state.trained(job, *run) {
                 app.ask(Action::FindObjects);
             }
         }
-        Ok(TrainingEnd::InputsChanged(how)) => ask_how_to_train(app, &how),
-        Err(_) => {}
+        Ok(TrainingEnd::InputsChanged(how)) => {
+            app.state.undo_start(before);
+            ask_how_to_train(app, &how);
+        }
+        Err(_) => {
+            app.state.undo_start(before);
+        }
     });
+    if started {
+        app.state.begin_training(next, reached);
+    }
 }
 
 /// Asks whether to continue a training with photos that have changed since it began.
@@ -57,7 +66,7 @@ fn ask_how_to_train(app: &mut App, changes: &str) {
          stays as it is if you train anew.",
         sentence(changes)
     );
-    let question = Question { text, yes: "Train anew", other: Some("Go on"), no: "Leave it", deletes: false };
+    let question = Question { text, yes: "Train anew", other: Some("Go on"), no: "Cancel", deletes: false };
     app.put_question(question, |app, answer| match answer {
         DialogAnswer::Yes => start(app, false, IfChanged::Anew),
         DialogAnswer::Other => start(app, false, IfChanged::GoOn),

@@ -71,7 +71,15 @@ pub(in crate::ui) fn show(app: &mut App, ctx: &Context, mode: ViewMode) {
         app.viewport.queries.tint(ColorBy::Masks);
     }
     if mode.needs_photo() && app.viewport.photo_index().is_none() {
-        nearest_photo(app, &BTreeSet::new()).into_iter().for_each(|photo| go_to_photo(app, ctx, photo));
+        visit_photo(app, ctx, app.layout.compare);
+    }
+}
+
+/// Looks through the camera of the nearest photo until nothing needs it; `compared` tells whether the comparison was on
+/// before.
+fn visit_photo(app: &mut App, ctx: &Context, compared: bool) {
+    if let Some(photo) = nearest_photo(app, &BTreeSet::new()) {
+        app.viewport.visit_photo(photo, &app.state, &app.tasks, compared, now(ctx));
     }
 }
 
@@ -101,12 +109,17 @@ pub(in crate::ui) fn nearest_photo(app: &App, left_out: &BTreeSet<usize>) -> Opt
 pub(in crate::ui) fn toggle_compare(app: &mut App, ctx: &Context) {
     app.layout.compare = !app.layout.compare;
     if app.layout.compare && app.viewport.photo_index().is_none() {
-        nearest_photo(app, &BTreeSet::new()).into_iter().for_each(|photo| go_to_photo(app, ctx, photo));
+        visit_photo(app, ctx, false);
     }
 }
 
-/// Splits the view in two, or ends that.
+/// Splits the view in two, or ends that. What is asked for or selected, and seen, stays in view.
 pub(in crate::ui) fn toggle_split(app: &mut App) {
+    if let Some(bounds) = chosen_identity(app).and_then(|id| app.viewport.bounds_of(id, &app.state))
+        && app.viewport.sees(&bounds)
+    {
+        app.viewport.ask_for(bounds);
+    }
     app.layout.split_view = !app.layout.split_view;
     app.viewport.queries.work_in(app.layout.split_view);
 }

@@ -139,7 +139,7 @@ macro_rules! action_table {
                 "Remove it again, with another choice of what hides below it; the scene made before stays."
                 => objects::submit_removal(app, *request);
             DeleteRemoved: "Delete this scene\u{2026}",
-                "Delete the scene that was made by removing something, which is shown beside this one. This one stays."
+                "Delete the scene of a removal that is shown beside this one; without one, the open scene."
                 => objects::ask_to_delete_removed(app);
             Transform(id: IdentityId): format!("Transform #{id}"),
                 "Drag it along the axes, turn, scale, duplicate or recolor it; can be undone." => edit::transform(app, id);
@@ -241,6 +241,8 @@ macro_rules! action_table {
                 => app.layout.dim = !app.layout.dim;
             ToggleCameras: "Show or hide cameras", "Show the cameras of the nearest photos, while nothing is asked for, selected or in use.", "V"
                 => app.layout.cameras = !app.layout.cameras;
+            ToggleMeasurements: "Show or hide measurements", "Draw kept measurements into the view, also while nothing is measured."
+                => app.layout.measurements = !app.layout.measurements;
             TogglePane(pane: Pane): format!("Show or hide the {} pane", pane.text().to_lowercase()),
                 "Show or hide this pane." => app.layout.toggle(pane);
             FillWindow: "Fill the window with the view", "Show only the view, full screen; again to show everything.", "F11"

@@ -3,6 +3,7 @@
 mod keys;
 pub(crate) mod player;
 mod recording;
+mod repeated;
 mod timeline;
 
 use std::collections::VecDeque;
@@ -11,6 +12,7 @@ use std::path::Path;
 use egui::{Align, Button, Checkbox, ComboBox, DragValue, Layout, RichText, ScrollArea, Ui, vec2};
 
 use self::player::{Clip, Player};
+use self::repeated::RepeatedPath;
 use super::ctx::Ctx;
 use super::panes::PaneContents;
 use super::theme;
@@ -42,6 +44,8 @@ pub(crate) struct CameraPane {
     flight_to: String,
     /// Number of the scene that the path belongs to.
     scene: u64,
+    /// The path that was set to repeat last.
+    repeated: Option<RepeatedPath>,
 }
 
 /// Width of the names of rows, points.
@@ -63,6 +67,7 @@ impl Default for CameraPane {
             next: VecDeque::new(),
             flight_to: String::new(),
             scene: 0,
+            repeated: None,
         }
     }
 }
@@ -147,6 +152,8 @@ impl CameraPane {
     /// Replaces the path by one that is repeated, and plays it.
     pub(crate) fn repeat(&mut self, path: CameraPath) {
         self.next.clear();
+        let (before, was_looped) = (self.path.clone(), self.player.looped);
+        self.repeated = Some(RepeatedPath { path: path.clone(), before, was_looped });
         self.player.replace(None);
         self.open(path);
         (self.player.looped, self.player.playing) = (true, true);
@@ -159,8 +166,11 @@ impl CameraPane {
         self.put_path_in();
     }
 
-    /// Replaces the path by an earlier or later state.
+    /// Replaces the path by an earlier or later state. With a repeated one, the repetition goes and comes.
     pub(crate) fn set_path(&mut self, path: CameraPath) {
+        if let Some(looped) = self.repeated.as_ref().and_then(|repeated| repeated.loops(&self.path, &path)) {
+            (self.player.looped, self.player.playing) = (looped, false);
+        }
         self.path = path;
         self.selected = self.selected.filter(|i| *i < self.path.keys.len());
     }

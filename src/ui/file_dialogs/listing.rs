@@ -75,6 +75,34 @@ fn entry(path: PathBuf) -> FolderEntry {
     }
 }
 
+/// Entries whose names begin with the typed letters, in any case; `folders` leaves files out.
+fn begun<'a>(
+    entries: &'a [&FolderEntry],
+    typed: &str,
+    folders: bool,
+) -> impl Iterator<Item = &'a FolderEntry> + use<'a> {
+    let typed = typed.to_lowercase();
+    let is_begun = move |e: &&FolderEntry| (e.is_folder || !folders) && e.name.to_lowercase().starts_with(&typed);
+    entries.iter().copied().filter(is_begun)
+}
+
+/// The entry that a typed name means: the one of this name, or else the first that begins with it.
+pub(super) fn named<'a>(entries: &'a [&FolderEntry], typed: &str, folders: bool) -> Option<&'a FolderEntry> {
+    let is_it = |e: &&FolderEntry| e.name.to_lowercase() == typed.to_lowercase();
+    begun(entries, typed, folders).find(is_it).or_else(|| begun(entries, typed, folders).next())
+}
+
+/// The typed name with what all entries that begin with it have in common; `None` if that is no more than is typed.
+pub(super) fn continued(entries: &[&FolderEntry], typed: &str, folders: bool) -> Option<String> {
+    let mut names = begun(entries, typed, folders).map(|e| e.name.as_str());
+    let first = names.next().filter(|_| !typed.is_empty())?;
+    let common = names.fold(first.chars().count(), |n, name| {
+        let same = |(a, b): &(char, char)| a.to_lowercase().eq(b.to_lowercase());
+        first.chars().zip(name.chars()).take(n).take_while(same).count()
+    });
+    (common > typed.chars().count()).then(|| first.chars().take(common).collect())
+}
+
 /// Folders that continue a typed one, each with a separator at its end.
 pub(super) fn completions(typed: &str) -> Vec<String> {
     let Some((above, begun)) = typed.rsplit_once(std::path::is_separator) else { return Vec::new() };
@@ -102,6 +130,34 @@ pub(super) fn expanded(typed: &str) -> PathBuf {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_begun_name_goes_on_as_far_as_all_that_fit_agree() {
+        let entry = |name: &str, is_folder| FolderEntry {
+            path: name.into(),
+            name: name.into(),
+            is_folder,
+            bytes: 0,
+            changed: None,
+        };
+        let all = [entry("Kitchen-1", true), entry("kitchen-2", true), entry("photos", true), entry("plan.txt", false)];
+        let all: Vec<&FolderEntry> = all.iter().collect();
+        for (typed, more) in [
+            ("k", Some("Kitchen-")),
+            ("ph", Some("photos")),
+            ("pl", None),
+            ("kitchen-1", None),
+            ("x", None),
+            ("", None),
+        ] {
+            assert_eq!(continued(&all, typed, true).as_deref(), more, "{typed}");
+        }
+        assert_eq!(continued(&all, "pl", false).as_deref(), Some("plan.txt"), "files count where they can be chosen");
+        assert_eq!(continued(&all, "p", false), None, "photos or plan.txt");
+        assert_eq!(named(&all, "KITCHEN-2", true).map(|e| e.name.as_str()), Some("kitchen-2"));
+        assert_eq!(named(&all, "kit", true).map(|e| e.name.as_str()), Some("Kitchen-1"));
+        assert!(named(&all, "plan", true).is_none());
+    }
 
     #[test]
     fn a_folder_lists_folders_first_and_one_that_cannot_be_read_says_why() {

@@ -15,7 +15,7 @@ use super::rows::{RowAct, RowList};
 use super::verdict::{NameVerdict, judge};
 use crate::scene::text;
 use crate::ui::dialogs::show_question;
-use crate::ui::text_field::select_start;
+use crate::ui::text_field::{cursor_to_end, select_start};
 use crate::ui::theme;
 use crate::worker::Repaint;
 
@@ -310,26 +310,30 @@ impl OwnDialog {
                 ui.ctx().request_repaint();
             }
             let hint = if self.request.is_folder() { "This folder" } else { "" };
-            let edit = TextEdit::singleline(&mut self.name).id(name_field()).hint_text(hint);
+            // Tab completes the name; it leaves the field once there is nothing to complete.
+            let more = listing::continued(entries, &self.name, self.request.is_folder()).filter(|_| !saves);
+            let has_more = more.is_some();
+            let is_here = ui.memory(|m| m.has_focus(name_field()));
+            let tab = |ui: &Ui| ui.input_mut(|i| i.consume_key(Modifiers::NONE, Key::Tab));
+            let completed = more.filter(|_| is_here && tab(ui));
+            let is_completed = completed.is_some();
+            if let Some(name) = completed {
+                self.name = name;
+                cursor_to_end(ui.ctx(), name_field(), &self.name);
+            }
+            let edit = TextEdit::singleline(&mut self.name).id(name_field()).hint_text(hint).lock_focus(has_more);
             let edit = edit.desired_width(ui.available_width() - formats).align(egui::Align2::LEFT_CENTER);
             let edit = ui.add(edit).accessible_name("File name");
             format_list::show(ui, &self.request, &mut self.format);
-            edit
+            (edit, is_completed)
         });
-        let edit = edit.inner;
-        if edit.changed() {
+        let (edit, is_completed) = edit.inner;
+        if edit.changed() || is_completed {
             (self.obstacle, self.selected, self.takes_keys) = (None, None, 0);
             self.follow_ending();
             if !saves && !self.name.is_empty() {
-                let typed = self.name.to_lowercase();
-                let named = |exact: bool| {
-                    let is = |e: &&&FolderEntry| match e.name.to_lowercase() {
-                        name if exact => name == typed,
-                        name => name.starts_with(&typed),
-                    };
-                    entries.iter().filter(|e| e.is_folder || !self.request.is_folder()).find(is)
-                };
-                self.selected = named(true).or_else(|| named(false)).map(|e| e.path.clone());
+                let named = listing::named(entries, &self.name, self.request.is_folder());
+                self.selected = named.map(|e| e.path.clone());
                 self.follows = true;
             }
         }

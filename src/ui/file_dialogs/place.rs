@@ -2,13 +2,16 @@
 
 use std::path::Path;
 
-use egui::{Align2, Button, CompletionPopup, CompletionQuery, Id, Key, Modifiers, RectAlign, Suggestion, TextEdit, Ui};
+use egui::{
+    Align2, Button, CompletionPopup, CompletionQuery, Id, Key, Modifiers, RectAlign, Suggestion, TextEdit, TextStyle,
+    Ui,
+};
 
 use super::listing::completions;
-use crate::scene::text;
+use crate::ui::short_names::fitted;
 
-/// Space of a letter of the folder, points.
-const LETTER_PT: f32 = 7.4;
+/// Room at both ends of the field, points.
+const PADDING_PT: f32 = 10.0;
 
 /// Wish of the user.
 pub(super) enum PlaceAct {
@@ -51,7 +54,7 @@ impl PlaceRow {
         let text = match is_typed {
             true => self.folder.get_or_insert_with(|| shown.clone()),
             // As much as has room, with both ends.
-            false => &mut text::elided(&shown, (width / LETTER_PT) as usize),
+            false => &mut fitted(ui, &shown, &TextStyle::Body.resolve(ui.style()), width - PADDING_PT),
         };
         let edit = TextEdit::singleline(text).desired_width(width).align(Align2::LEFT_CENTER);
         let offered = |query: &CompletionQuery<'_>| match is_typed && query.text != shown {
@@ -79,7 +82,7 @@ impl PlaceRow {
                 if name.is_empty() && !edit.has_focus() && !edit.lost_focus() {
                     edit.request_focus();
                 }
-                [ui.button("Make").clicked() || enters, ui.button("Leave it").clicked()]
+                [ui.button("Make").clicked() || enters, ui.button("Discard").clicked()]
             })
             .inner;
         let name = name.trim().to_owned();

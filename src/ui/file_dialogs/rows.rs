@@ -7,15 +7,13 @@ use egui::{
 
 use super::listing::FolderEntry;
 use crate::math::format;
-use crate::scene::text;
+use crate::ui::short_names::fitted;
 use crate::ui::theme;
 
 /// Height of a row and widths of the columns at the right, points.
 const ROW_PT: f32 = 24.0;
 const SIZE_PT: f32 = 74.0;
 const DATE_PT: f32 = 92.0;
-/// Space of a letter of a name, points.
-const LETTER_PT: f32 = 7.4;
 
 /// Act of the user on the list.
 pub(super) enum RowAct {
@@ -85,7 +83,7 @@ impl RowList<'_> {
             folder_mark(ui, pos2(left, rect.center().y));
         }
         let width = size.x - SIZE_PT - DATE_PT - 30.0;
-        let name = text::elided(&entry.name, (width / LETTER_PT).max(8.0) as usize);
+        let name = fitted(ui, &entry.name, &TextStyle::Body.resolve(ui.style()), width);
         cell(ui, &name, color, Rect::from_min_size(pos2(left + 22.0, rect.top()), vec2(width, ROW_PT)), Align::Min);
         let [size_at, date_at] = [DATE_PT + SIZE_PT, DATE_PT].map(|from| pos2(rect.right() - from, rect.top()));
         if !entry.is_folder {

@@ -5,7 +5,7 @@ mod input;
 
 use egui::Ui;
 
-use super::act::{act, edits, measure, query, remote, view, window};
+use super::act::{act, edits, elsewhere, measure, query, remote, view, window};
 use super::actions::Pane;
 use super::app::App;
 use super::state::Tone;
@@ -23,6 +23,7 @@ impl eframe::App for App {
         self.layout.zoom = ctx.zoom_factor();
         input::take(self, &ctx);
         window::watch_close(self, &ctx);
+        elsewhere::watch(self, &ctx);
         draw::panes(self, ui);
         draw::over_everything(self, &ctx);
         for action in std::mem::take(&mut self.actions) {

@@ -6,12 +6,11 @@ use egui::{Align, Button, Layout, RichText, Stroke, Ui, vec2};
 use strum::VariantArray;
 
 use super::super::ctx::Ctx;
+use super::super::short_names::short_path;
 use super::super::state::RunningJob;
 use super::super::toasts::{self, ToastClick};
 use super::super::viewport::Viewport;
 use super::super::{keys, theme};
-use crate::math::format;
-use crate::pipeline::observer::Progress;
 use crate::remote::LinkStatus;
 use crate::scene::{NO_IDENTITY, text};
 use crate::ui::actions::{Action, Axis, Face, Pane, THEMES};
@@ -51,8 +50,9 @@ pub(crate) fn top(ui: &mut Ui, cx: &mut Ctx<'_>, view: &Viewport) {
                 for path in &state.recent {
                     let known = state.recent_scenes.iter().find(|known| known.path == *path);
                     let name = known.map_or_else(|| text::path(path), |known| known.name.clone());
-                    let place = text::elided(&path.to_string_lossy(), 48);
-                    if ui.add(Button::new(text::elided(&name, 40)).shortcut_text(place)).clicked() {
+                    let place = short_path(path, &state.recent, 48);
+                    let button = ui.add(Button::new(text::elided(&name, 56)).shortcut_text(place));
+                    if button.on_hover_text(text::path(path)).clicked() {
                         cx.ask(Action::Open(path.clone()));
                     }
                     for run in known.map_or(&[][..], |known| &known.runs) {
@@ -71,6 +71,7 @@ pub(crate) fn top(ui: &mut Ui, cx: &mut Ctx<'_>, view: &Viewport) {
             ui.separator();
             item(ui, has_scene, None, Action::SaveCopy, cx);
             item(ui, has_scene, None, Action::ShowFolder(None), cx);
+            item(ui, has_scene, None, Action::DeleteRemoved, cx);
             ui.separator();
             item(ui, true, None, Action::Quit, cx);
         });
@@ -93,6 +94,8 @@ pub(crate) fn top(ui: &mut Ui, cx: &mut Ctx<'_>, view: &Viewport) {
             });
             ui.separator();
             item(ui, has_photos, Some(cx.layout.cameras), Action::ToggleCameras, cx);
+            let has_measured = !view.measurements.is_empty();
+            item(ui, has_measured, Some(cx.layout.measurements), Action::ToggleMeasurements, cx);
             item(ui, has_photos, Some(cx.layout.compare), Action::ToggleCompare, cx);
             item(ui, has_scene, Some(cx.layout.split_view), Action::ToggleSplit, cx);
             item(ui, cx.layout.split_view, Some(false), Action::OtherView, cx);
@@ -193,6 +196,7 @@ pub(crate) fn top(ui: &mut Ui, cx: &mut Ctx<'_>, view: &Viewport) {
 fn item(ui: &mut Ui, enabled: bool, on: Option<bool>, action: Action, cx: &mut Ctx<'_>) {
     let text = match &action {
         Action::ToggleCameras => "Cameras".to_owned(),
+        Action::ToggleMeasurements => "Measurements".to_owned(),
         Action::ToggleTimes => "Frame times".to_owned(),
         Action::TogglePane(pane) => pane.text().to_owned(),
         other => other.text(),
@@ -231,8 +235,8 @@ pub(crate) fn status(ui: &mut Ui, cx: &mut Ctx<'_>, picture: Option<&ViewPicture
                 // A message goes first where there is no room for both.
                 let has_room = state.toasts.is_empty() || ui.available_width() > CROWDED_PT;
                 let shown = has_room && state.scene.is_some() && !job.canceling;
-                if let Some(p) = job.progress.as_ref().filter(|_| shown) {
-                    progress(ui, p, job);
+                if job.progress.is_some() && shown {
+                    progress(ui, job);
                 }
             }
             None if !state.toasts.is_empty() => {}
@@ -305,17 +309,14 @@ fn dot(ui: &mut Ui, color: egui::Color32) {
     ui.painter().circle_filled(rect.center(), 4.0, color);
 }
 
-fn progress(ui: &mut Ui, p: &Progress, job: &RunningJob) {
-    let Some(counted) = p.counted() else {
-        if !job.paused {
-            ui.add(egui::Spinner::new().size(12.0));
+fn progress(ui: &mut Ui, job: &RunningJob) {
+    match job.fraction() {
+        None if job.paused => {}
+        None => drop(ui.add(egui::Spinner::new().size(12.0))),
+        Some(fraction) => {
+            let fill = if job.paused { theme::warning() } else { theme::accent() };
+            ui.add(egui::ProgressBar::new(fraction).desired_width(140.0).desired_height(6.0).fill(fill));
         }
-        ui.label(RichText::new(format!("{}\u{2026}", p.stage)).color(theme::weak()));
-        return;
-    };
-    let fraction = p.done as f32 / p.total.max(1) as f32;
-    let fill = if job.paused { theme::warning() } else { theme::accent() };
-    ui.add(egui::ProgressBar::new(fraction).desired_width(140.0).desired_height(6.0).fill(fill));
-    let left = job.left_secs.filter(|_| !job.paused).map(|secs| format!("  ·  {} left", format::about(secs)));
-    ui.label(RichText::new(format!("{}  {counted}{}", p.stage, left.unwrap_or_default())).color(theme::weak()));
+    }
+    ui.label(RichText::new(job.stage_text()).color(theme::weak()));
 }

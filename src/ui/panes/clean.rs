@@ -95,7 +95,8 @@ impl CleanPane {
         self.chosen = of.map(|of| Arc::new(SplatSelection::new(of, self.choice.hide)));
     }
 
-    fn show_chosen(&mut self, ui: &mut Ui, measured: &MeasuredCloud, cx: &mut Ctx<'_>) {
+    /// Draws what is selected, and its uses; while the selection tool has them, only a word on that.
+    fn show_chosen(&mut self, ui: &mut Ui, measured: &MeasuredCloud, is_selecting: bool, cx: &mut Ctx<'_>) {
         theme::section(ui, "Selected");
         let (count, all) = (self.chosen.as_ref().map_or(0, |c| c.count), measured.cloud.len());
         let share = format::percent(count as f64 / all.max(1) as f64);
@@ -105,17 +106,11 @@ impl CleanPane {
                 ui.radio_value(&mut self.choice.hide, false, "Mark").on_hover_text("Show them in magenta.");
                 ui.radio_value(&mut self.choice.hide, true, "Hide").on_hover_text("Show the scene without them.");
             });
-            let mut other = |ui: &mut Ui, text: &str, tip: &str, change: fn(&CloudMeasures, &[bool]) -> Vec<bool>| {
-                let button = ui.add_enabled(count > 0, Button::new(text)).on_hover_text(tip);
-                if let Some(chosen) = self.chosen.as_mut().filter(|_| button.clicked()) {
-                    *chosen = Arc::new(SplatSelection::new(change(&measured.measures, &chosen.of), self.choice.hide));
-                }
-            };
-            other(ui, "Grow", "Take the neighbors of the selected Gaussians, too.", |m, of| m.neighbors().grown(of));
-            other(ui, "Shrink", "Leave out Gaussians with a neighbor that is not selected.", |m, of| {
-                m.neighbors().shrunk(of)
-            });
         });
+        if is_selecting {
+            ui.weak("The selection tool is in use: its card changes, keeps and deletes the selection.");
+            return;
+        }
         ui.horizontal(|ui| {
             let delete = Action::DeleteChosen;
             let button = ui.add_enabled(count > 0 && count < all, theme::primary_button("Delete"));
@@ -187,7 +182,7 @@ impl PaneContents for CleanPane {
         }
         let Some(measured) = self.measured.clone() else { return self.offer(ui, cx) };
         let before = self.choice.clone();
-        self.show_chosen(ui, &measured, cx);
+        self.show_chosen(ui, &measured, view.is_selecting(), cx);
         theme::section(ui, "Suspects");
         for (rule, count) in &self.counts {
             self.choice.show_rule(ui, *rule, *count);

@@ -10,6 +10,7 @@ use egui::{
 };
 
 use super::super::ctx::Ctx;
+use super::super::short_names::{fitted, short_path};
 use super::super::state::{AppState, RunningJob};
 use super::super::viewport::Viewport;
 use super::super::{keys, theme};
@@ -17,7 +18,6 @@ use crate::jobs::demo;
 use crate::jobs::recent::{self, RecentScene};
 use crate::jobs::runs::RunSummary;
 use crate::jobs::workspace::Workspace;
-use crate::math::format;
 use crate::pipeline::observer::{Observer, Severity};
 use crate::scene::{PhotoPixels, text};
 use crate::ui::actions::Action;
@@ -197,7 +197,7 @@ impl FirstPage {
                 ui.spacing_mut().item_spacing = vec2(gap, gap);
                 for path in row {
                     let known = state.recent_scenes.iter().find(|known| known.path == **path);
-                    if self.card(ui, path, known, size) {
+                    if self.card(ui, (path, &state.recent), known, size) {
                         cx.ask(Action::Open((*path).clone()));
                     }
                 }
@@ -219,7 +219,7 @@ impl FirstPage {
 
     /// Draws a recent scene: image, name, and its training, its number of trainings or its folder. Returns true if it
     /// was clicked.
-    fn card(&self, ui: &mut Ui, path: &Path, known: Option<&RecentScene>, size: Vec2) -> bool {
+    fn card(&self, ui: &mut Ui, (path, recent): (&Path, &[PathBuf]), known: Option<&RecentScene>, size: Vec2) -> bool {
         let file = || text::path(path.file_name().map_or(path, Path::new));
         let name = known.map_or_else(file, |known| known.name.clone());
         let (rect, response) = ui.allocate_exact_size(size, Sense::click());
@@ -236,16 +236,20 @@ impl FirstPage {
         let below = CornerRadius { nw: 0, ne: 0, sw: CARD_RADIUS, se: CARD_RADIUS };
         painter.rect_filled(bar, below, Color32::from_black_alpha(170));
         let at = bar.left_top() + vec2(10.0, 5.0);
-        let letters = (size.x / 7.5) as usize;
-        painter.text(at, Align2::LEFT_TOP, text::elided(&name, letters), FontId::proportional(14.0), Color32::WHITE);
-        let parent = || path.parent().map(|p| p.to_string_lossy().into_owned()).unwrap_or_default();
+        let (large, small, width) = (FontId::proportional(14.0), FontId::proportional(10.5), size.x - 20.0);
+        let name = fitted(ui, &name, &large, width);
+        painter.text(at, Align2::LEFT_TOP, name, large, Color32::WHITE);
+        let parent = || {
+            let above = |path: &Path| path.parent().map(Path::to_path_buf).unwrap_or_default();
+            let others: Vec<PathBuf> = recent.iter().map(|path| above(path)).collect();
+            short_path(&above(path), &others, 48)
+        };
         let about = match known.map_or(&[][..], |known| &known.runs) {
             [] => parent(),
             [run] => run.facts(),
             several => format!("{} trainings", several.len()),
         };
-        let small = FontId::proportional(10.5);
-        let about = text::elided(&about, letters + 8);
+        let about = fitted(ui, &about, &small, width);
         painter.text(at + vec2(0.0, 17.0), Align2::LEFT_TOP, about, small, Color32::from_gray(200));
         if response.hovered() || response.has_focus() {
             let line = Stroke::new(1.5, theme::accent());
@@ -277,13 +281,10 @@ fn busy(ui: &mut Ui, job: &RunningJob, cx: &mut Ctx<'_>) {
         ui.add_space(10.0);
         // The page has the color that a progress bar's track has elsewhere.
         ui.visuals_mut().extreme_bg_color = theme::surface();
-        match job.progress.as_ref().and_then(|p| Some((p, p.counted()?))) {
-            Some((p, counted)) => {
-                let fraction = p.done as f32 / p.total.max(1) as f32;
+        match job.fraction() {
+            Some(fraction) => {
                 ui.add(ProgressBar::new(fraction).desired_height(8.0).fill(theme::accent()));
-                let left = job.left_secs.map_or_else(String::new, |s| format!("  ·  {} left", format::about(s)));
-                let text = format!("{}  {counted}{left}", p.stage);
-                ui.label(RichText::new(text).color(theme::weak()));
+                ui.label(RichText::new(job.stage_text()).color(theme::weak()));
             }
             None => {
                 ui.spinner();

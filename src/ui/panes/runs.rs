@@ -32,8 +32,9 @@ const LIST_PT: f32 = 3.6 * ROW_PT;
 /// Runs with their pictures.
 type Listed = (Vec<RunSummary>, Vec<(PathBuf, PhotoPixels)>);
 
-/// State of the window that the list was made for: the scene, its folder, its objects, and whether a job runs.
-type ListedFor = (u64, PathBuf, Option<u64>, bool);
+/// State of the window that the list was made for: the scene, its folder, its objects, whether a job runs, and whether
+/// its training has done a step.
+type ListedFor = (u64, PathBuf, Option<u64>, bool, bool);
 
 /// The list of the open photos' training runs.
 #[derive(Default)]
@@ -61,7 +62,8 @@ impl RunsList {
         let Some(scene) = state.scene.as_ref().filter(|s| s.remote.is_none()) else { return };
         let Some(source) = scene.dataset.as_ref().map(|d| d.source().to_path_buf()) else { return };
         let objects = state.semantics.as_ref().map(|map| map.generation());
-        let now = (state.scene_number, scene.out.clone(), objects, state.job.is_some());
+        let trains = state.is_training() && !state.history.steps.is_empty();
+        let now = (state.scene_number, scene.out.clone(), objects, state.job.is_some(), trains);
         if self.listed_for.as_ref() != Some(&now) {
             self.listed_for = Some(now);
             let workspace = Arc::clone(workspace);
@@ -94,8 +96,12 @@ impl RunsList {
         let height = (scene.runs.len() as f32 * (ROW_PT + ui.spacing().item_spacing.y)).min(LIST_PT);
         let list = ScrollArea::vertical().id_salt("trainings").max_height(height).auto_shrink([false, true]);
         list.show(ui, |ui| {
+            // What is on screen is that of a new training once there is one.
+            let held = |run: &&RunSummary| run.holder.as_ref().is_some_and(|holder| holder.is_own);
+            let anew = state.trains_anew().then(|| scene.runs.iter().rfind(held)).flatten();
+            let open = anew.map_or(&scene.out, |run| &run.folder);
             for run in &scene.runs {
-                self.row(ui, run, run.folder == scene.out, cx);
+                self.row(ui, run, run.folder == *open, cx);
             }
         });
     }
@@ -131,22 +137,28 @@ impl RunsList {
     fn texts(&mut self, ui: &mut Ui, run: &RunSummary, is_open: bool, cx: &mut Ctx<'_>) {
         let weak =
             |text: String| Label::new(RichText::new(text).small().color(theme::weak())).selectable(false).truncate();
-        let is_training = is_open && cx.state.is_training();
+        let holder = run.holder.as_ref();
         let first = |ui: &mut Ui| {
             ui.spacing_mut().item_spacing.x = 4.0;
             ui.spacing_mut().button_padding = vec2(6.0, 1.0);
-            let menu = ui.menu_button("\u{2026}", |ui| self.menu(ui, run, is_open, is_training, cx));
+            let menu = ui.menu_button("\u{2026}", |ui| self.menu(ui, run, is_open, cx));
             menu.response.on_hover_text(format!("Actions on {}", run.name));
             if self.renaming.as_ref().is_some_and(|renaming| renaming.of == run.folder) {
                 return self.name_field(ui, cx);
             }
-            match run.changed {
-                _ if is_training => drop(ui.add(weak("training".into()))),
-                Some(time) => {
+            match (holder, run.changed) {
+                (Some(holder), _) => {
+                    let what = if holder.what.is_empty() { "in use" } else { &holder.what };
+                    let label = ui.add(weak(what.into()));
+                    if !holder.is_own {
+                        label.on_hover_text("Another program writes to it.");
+                    }
+                }
+                (None, Some(time)) => {
                     let ago = ui.add(weak(format::ago(time, SystemTime::now())));
                     ago.on_hover_text(format!("Saved {}", format::moment(time)));
                 }
-                None => {}
+                (None, None) => {}
             }
             ui.with_layout(Layout::left_to_right(Align::Center), |ui| {
                 let name = RichText::new(&run.name).strong().color(theme::text());
@@ -159,13 +171,14 @@ impl RunsList {
         ui.add(weak(objects));
     }
 
-    fn menu(&mut self, ui: &mut Ui, run: &RunSummary, is_open: bool, is_training: bool, cx: &mut Ctx<'_>) {
+    fn menu(&mut self, ui: &mut Ui, run: &RunSummary, is_open: bool, cx: &mut Ctx<'_>) {
         ui.set_min_width(150.0);
-        if ui.add_enabled(!is_open, Button::new("Open")).clicked() {
+        let is_saved = run.changed.is_some();
+        if ui.add_enabled(!is_open && is_saved, Button::new("Open")).clicked() {
             cx.ask(Action::Open(run.folder.clone()));
         }
         // What was made of a training has its name in its own file.
-        if run.is_training && ui.button("Rename\u{2026}").clicked() {
+        if run.is_training && is_saved && ui.button("Rename\u{2026}").clicked() {
             self.renaming = Some(NameField::new(run.folder.clone(), run.name.clone()));
         }
         if ui.button("Show in folder").clicked() {
@@ -176,7 +189,7 @@ impl RunsList {
         }
         ui.separator();
         let delete = Button::new(RichText::new("Delete\u{2026}").color(theme::error()));
-        let delete = ui.add_enabled(!is_training, delete).on_disabled_hover_text("It is being trained.");
+        let delete = ui.add_enabled(run.holder.is_none(), delete).on_disabled_hover_text("It is being written to.");
         if delete.clicked() {
             cx.ask(Action::DeleteRun(run.folder.clone()));
         }

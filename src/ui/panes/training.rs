@@ -218,7 +218,7 @@ fn settings(ui: &mut Ui, config: &mut TrainConfig, largest_px: u32) {
 }
 
 fn running(ui: &mut Ui, job: &RunningJob, cx: &mut Ctx<'_>) {
-    let done = job.progress.as_ref().map_or(0.0, |p| p.done as f32 / p.total.max(1) as f32);
+    let done = job.fraction().unwrap_or(0.0);
     let text = job.progress.as_ref().map_or_else(
         || "starting".to_owned(),
         |p| format!("{}  {} of {}", p.stage, format::count(p.done), format::count(p.total)),

@@ -17,11 +17,10 @@ use crate::jobs::models::ModelList;
 use crate::jobs::rearrange::RearrangedScene;
 use crate::jobs::recent::RecentScene;
 use crate::jobs::remove::StoredRemoval;
-use crate::jobs::workspace::TrainedRun;
 use crate::jobs::{OpenedScene, Scene};
 use crate::math::format;
 use crate::measure::Report;
-use crate::pipeline::observer::{Evaluation, Progress, Severity};
+use crate::pipeline::observer::{Progress, Severity};
 use crate::pipeline::train::TrainConfig;
 use crate::remote::LinkStatus;
 use crate::render::RenderSettings;
@@ -31,6 +30,7 @@ use crate::worker::{Event, JobEnd, JobId, JobInfo, JobLane, Makes, Versioned};
 
 mod messages;
 mod running;
+mod training;
 
 /// Length of the recent list.
 const MAX_RECENT: usize = 8;
@@ -139,7 +139,7 @@ impl AppState {
                 if self.training_job == Some(job) {
                     // A training that starts over is another one; the previous is kept for comparison.
                     if self.history.steps.first().is_some_and(|first| metrics.step <= first.step) {
-                        self.previous = std::mem::take(&mut self.history);
+                        self.begin_curve();
                     }
                     self.history.push(metrics);
                 }
@@ -223,22 +223,6 @@ impl AppState {
         RenderSettings { sh_degree, antialias: self.antialias, ..scene }
     }
 
-    /// The settings of a training started now.
-    pub(crate) fn next_training(&self, config: &TrainConfig) -> TrainConfig {
-        TrainConfig { max_side_px: self.plan.train_side_px, ..config.clone() }
-    }
-
-    /// The step at which a training with these settings would continue; `None` if it cannot or has no steps left.
-    pub(crate) fn continues_at(&self, config: &TrainConfig) -> Option<u64> {
-        let (before, step) = self.resumable.as_ref()?;
-        (before.is_same_but_for_steps(config) && (1..config.steps).contains(step)).then_some(*step)
-    }
-
-    /// True if there is a training beside which another could begin.
-    pub(crate) fn can_begin_anew(&self) -> bool {
-        self.resumable.as_ref().is_some_and(|(_, step)| *step > 0)
-    }
-
     fn set_facts(&mut self, facts: SceneFacts) {
         self.plan = ScenePlan::new(facts, &self.plan.overrides);
     }
@@ -246,14 +230,6 @@ impl AppState {
     fn with_job(&mut self, job: JobId, change: impl FnOnce(&mut RunningJob)) {
         let long = self.job.as_mut().filter(|j| j.id == job);
         long.or(self.short_jobs.get_mut(&job)).map(change);
-    }
-
-    fn evaluated_in_training(&mut self, job: JobId, evaluation: Evaluation) {
-        if self.training_job == Some(job) {
-            let Evaluation { step, psnr, ssim, .. } = &evaluation;
-            self.say(Tone::Info, format!("Step {step}: held-out PSNR {psnr:.2} dB, SSIM {ssim:.3}"));
-            self.history.evaluations.push(evaluation);
-        }
     }
 
     /// Sets objects and parts, with their counts.
@@ -285,41 +261,6 @@ impl AppState {
         self.set_semantics(scene.semantics.clone());
         (self.labels, self.phrases) = Default::default();
         self.scene = Some(Arc::new(scene));
-    }
-
-    /// Shows the end of a training. Returns true if its objects are to be found next.
-    pub(crate) fn trained(&mut self, job: JobId, run: TrainedRun) -> bool {
-        let TrainedRun { evaluations, out, semantics, runs, stopped_at, facts } = run;
-        let carried = semantics.is_some();
-        if self.training_job == Some(job) {
-            self.history.evaluations = evaluations;
-            self.set_facts(facts);
-            self.set_semantics(semantics);
-            self.scene = self.scene.take().map(|s| Arc::new(OpenedScene { runs, ..s.trained_in(&out) }));
-            let reached = stopped_at.or(self.history.steps.last().map(|s| s.step));
-            self.resumable.iter_mut().zip(reached).for_each(|((_, step), reached)| *step = reached);
-        }
-        let origin = self.scene.as_ref().and_then(|scene| scene.remote.as_ref());
-        let host = origin.map_or_else(String::new, |origin| format!(" on {}", origin.host));
-        self.say(Tone::Info, format!("Saved to {}{host}", out.display()));
-        if stopped_at.is_some() {
-            let name = self.scene.as_ref().map_or("", |s| &s.name);
-            self.toast(Tone::Info, format!("Training {name}: canceled"));
-            return false;
-        }
-        let quality = self.history.evaluations.last().map(|e| format!(", held-out PSNR {:.2} dB", e.psnr));
-        self.toast(Tone::Good, format!("Training finished{}", quality.unwrap_or_default()));
-        !carried && self.scene.as_ref().is_some_and(|s| s.masks.is_some())
-    }
-
-    /// Shows a held-out evaluation of the Gaussians on screen.
-    pub(crate) fn evaluated(&mut self, mut e: Evaluation) {
-        if let Some(last) = self.history.steps.last() {
-            (e.step, e.secs) = (last.step, last.secs);
-        }
-        self.history.evaluations.retain(|old| old.step < e.step);
-        self.toast(Tone::Good, format!("Held-out PSNR {:.2} dB, SSIM {:.3}", e.psnr, e.ssim));
-        self.history.evaluations.push(e);
     }
 
     /// Shows edited Gaussians, which continue in another folder as the same scene; returns them.
@@ -386,9 +327,7 @@ impl AppState {
             None if scene.dataset.is_some() => {
                 "Nothing to query yet: find objects first (Ctrl+P, Find objects and parts)."
             }
-            None => {
-                "Nothing to query yet: select an object by clicks first (Ctrl+P, \u{201c}select a new object\u{201d})."
-            }
+            None => "Nothing to query yet: select an object by clicks first (Ctrl+P, New object).",
         };
         Some(why.into())
     }

@@ -1,6 +1,8 @@
 //! The running job and its remaining time.
 
 use super::AppState;
+use crate::jobs::phases::WholeProgress;
+use crate::math::format;
 use crate::pipeline::observer::Progress;
 use crate::worker::{JobId, JobInfo, Makes};
 
@@ -13,6 +15,8 @@ pub struct RunningJob {
     pub(crate) id: JobId,
     pub(crate) info: JobInfo,
     pub(crate) progress: Option<Progress>,
+    /// Progress over all phases of the job.
+    pub(crate) whole: WholeProgress,
     /// Remaining time in s, if known: a moving average, as the forecasts from rates jump.
     pub(crate) left_secs: Option<f64>,
     /// True if the job is paused.
@@ -23,7 +27,8 @@ pub struct RunningJob {
 
 impl RunningJob {
     pub(super) fn begun(id: JobId, info: JobInfo) -> Self {
-        Self { id, info, progress: None, left_secs: None, paused: false, canceling: false }
+        let whole = info.whole.clone();
+        Self { id, info, progress: None, whole, left_secs: None, paused: false, canceling: false }
     }
 
     /// Title, with a note if the job is paused or being canceled.
@@ -44,17 +49,41 @@ impl RunningJob {
         }
     }
 
+    /// Done fraction of the whole job; `None` if nothing is counted.
+    pub(crate) fn fraction(&self) -> Option<f32> {
+        let is_counted = self.whole.is_planned() || self.progress.as_ref().is_some_and(|p| p.total > 0);
+        is_counted.then(|| self.whole.fraction() as f32)
+    }
+
+    /// Stage, count and remaining time for display: "Closing surfaces  2 of 3  ·  about 40 s left".
+    pub(crate) fn stage_text(&self) -> String {
+        let Some(progress) = &self.progress else { return String::new() };
+        let counted = progress.counted().map_or_else(|| "\u{2026}".into(), |counted| format!("  {counted}"));
+        let left = self.left_secs.filter(|_| !self.paused).map_or_else(String::new, |secs| {
+            let time = format::about(secs);
+            let about = if self.whole.is_guess() && !time.starts_with("about") { "about " } else { "" };
+            format!("  \u{b7}  {about}{time} left")
+        });
+        format!("{}{counted}{left}", progress.stage)
+    }
+
     pub(super) fn goes_on(&mut self, progress: Progress) {
-        let before = self.progress.replace(progress.clone()).filter(|p| p.stage == progress.stage);
-        let before = before.zip(self.left_secs).map(|(p, left)| (progress.elapsed_secs - p.elapsed_secs, left));
-        self.left_secs = match (progress.eta_secs(), before) {
+        let (secs, is_planned) = (self.whole.secs(), self.whole.is_planned());
+        self.whole.take(&progress);
+        let before = self.progress.replace(progress.clone()).filter(|p| is_planned || p.stage == progress.stage);
+        let before = before.and(self.left_secs).map(|left| (self.whole.secs() - secs, left));
+        let with_later = |left: f64| left + self.whole.later_secs(left);
+        self.left_secs = match (progress.eta_secs().map(with_later), before) {
             (Some(now), Some((step, left))) => {
                 let expected = left - step;
                 let smooth = expected + (now - expected) * (1.0 - (-step.max(0.0) / FORECAST_SECS).exp());
                 // At least half the forecast by the mean rate: a first rate may have been far too high.
                 let average = progress.elapsed_secs * progress.total as f64 / progress.done.max(1) as f64;
-                Some(smooth.max(0.5 * (average - progress.elapsed_secs).min(now)).max(0.0))
+                let average = with_later((average - progress.elapsed_secs).max(0.0));
+                Some(smooth.max(0.5 * average.min(now)).max(0.0))
             }
+            // Other phases follow.
+            (None, Some((step, left))) if self.whole.is_guess() => Some((left - step).max(0.0)),
             // All counted work is done, or nothing is counted.
             _ if progress.done >= progress.total => None,
             (now, before) => now.or(before.map(|(_, left)| left)),
@@ -72,6 +101,7 @@ impl AppState {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::jobs::phases;
 
     fn at(done: u64, elapsed_secs: f64, rate: f64) -> Progress {
         Progress { stage: "Training".into(), done, total: 3_000, elapsed_secs, rate }
@@ -101,5 +131,28 @@ mod tests {
         assert_eq!(job.left_secs, Some(30.0), "another stage begins anew");
         job.goes_on(Progress { stage: "Saving".into(), ..at(3_000, 30.5, 100.0) });
         assert_eq!(job.left_secs, None, "what is done leaves nothing");
+    }
+
+    #[test]
+    fn phases_share_one_bar_and_one_remaining_time() {
+        let info = JobInfo::long("Exporting").phases(phases::EXPORT);
+        let mut job = RunningJob::begun(JobId::Local(1), info);
+        assert_eq!((job.fraction(), job.stage_text().as_str()), (Some(0.0), ""));
+        let at = |stage: &str, done| Progress { stage: stage.into(), total: 70, ..at(done, done as f64, 1.0) };
+        job.goes_on(at("Writing Gaussians", 35));
+        assert_eq!((job.fraction(), job.left_secs), (Some(0.35), Some(65.0)), "35 s, and 30 s of the other phase");
+        assert_eq!(job.stage_text(), "Writing Gaussians  35 of 70  \u{b7}  about 70 s left");
+        job.goes_on(at("Writing Gaussians", 70));
+        assert_eq!((job.fraction(), job.left_secs), (Some(0.7), Some(30.0)));
+        job.goes_on(at("Measuring the loss", 0));
+        assert_eq!((job.fraction(), job.left_secs), (Some(0.7), Some(30.0)), "it goes on from there");
+        job.goes_on(at("Measuring the loss", 70));
+        assert_eq!((job.fraction(), job.left_secs), (Some(1.0), None));
+        // Control: a job of unknown phases has a bar for each, and none while nothing is counted.
+        let mut job = RunningJob::begun(JobId::Local(1), JobInfo::long("Exporting"));
+        assert_eq!(job.fraction(), None);
+        job.goes_on(at("Writing Gaussians", 70));
+        job.goes_on(at("Measuring the loss", 7));
+        assert_eq!(job.fraction(), Some(0.1));
     }
 }

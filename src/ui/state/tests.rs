@@ -1,7 +1,9 @@
 //! Tests of the fold over events.
 
 use super::*;
-use crate::pipeline::observer::StepMetrics;
+use crate::jobs::workspace::TrainedRun;
+use crate::pipeline::observer::{Evaluation, StepMetrics};
+use crate::pipeline::train::TrainConfig;
 use crate::scene::Dataset;
 use crate::ui::train_history::MAX_STEPS;
 use crate::worker::Failure;
@@ -219,4 +221,29 @@ fn lines_of_the_log_have_their_time() {
     s.stamp_log(20.25);
     let lines: Vec<String> = s.log.iter().map(LogLine::dated).collect();
     assert_eq!(lines, ["    1.50 s  first", "   20.25 s  second"]);
+}
+
+#[test]
+fn a_training_without_a_step_puts_back_what_it_replaced() {
+    let config = TrainConfig::default();
+    for (reached, steps, is_undone) in
+        [(None, 0, true), (None, 100, false), (Some(100), 0, true), (Some(100), 101, false)]
+    {
+        let mut s = AppState { resumable: Some((config.clone(), 100)), ..AppState::default() };
+        s.history.push(StepMetrics { step: 100, ..StepMetrics::default() });
+        s.set_semantics(Some(Arc::new(SemanticMap::default())));
+        let before = s.before_training(reached);
+        s.begin_training(TrainConfig { steps: 7, ..config.clone() }, reached);
+        s.apply(started(Makes::Gaussians));
+        assert!(s.semantics.is_none() && s.history.steps.is_empty() == reached.is_none());
+        assert_eq!(s.trains_anew(), reached.is_none());
+        if steps > 0 {
+            s.apply(step(steps));
+        }
+        s.apply(canceled(JOB));
+        assert_eq!(s.undo_start(before), is_undone, "{reached:?}, {steps}");
+        assert_eq!(s.semantics.is_some(), is_undone);
+        assert_eq!(s.resumable.as_ref().is_some_and(|(config, _)| config.steps != 7), is_undone);
+        assert_eq!(s.history.steps.len(), if reached.is_some() && !is_undone { 2 } else { 1 });
+    }
 }

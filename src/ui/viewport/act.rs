@@ -4,9 +4,10 @@ use std::sync::Arc;
 
 use glam::{DVec2, DVec3};
 
-use super::eye::Eye;
+use super::eye::{Eye, is_in_view};
 use super::photo::PhotoView;
 use super::splat_selection::SplatSelection;
+use super::straight::front_of;
 use super::tools::Tool;
 use super::tools::crop::CropTool;
 use super::tools::mask_brush::MaskBrush;
@@ -23,6 +24,7 @@ use crate::navigate::Pose;
 use crate::pipeline::semantics::lifting::edit::Edit;
 use crate::scene::{Bounds, CropBox, IdentityId, NO_IDENTITY};
 use crate::ui::actions::Face;
+use crate::ui::layout::Layout;
 use crate::ui::select_shape::SelectShape;
 use crate::worker::Tasks;
 
@@ -78,8 +80,7 @@ impl Viewport {
         let Some(scene) = &state.scene else { return };
         self.leave_photo();
         let selected = self.parts().1.selected_bounds(state.semantics.as_ref());
-        let ahead = scene.home.camera.as_ref().map_or(DVec3::Y, |camera| camera.forward());
-        self.eye.look_from(face, ahead);
+        self.eye.look_from(face, front_of(Some(&scene.home)));
         self.eye.set_orthographic(true);
         self.eye.frame(selected.as_ref().unwrap_or(&scene.home.bounds));
         self.moved_at = now;
@@ -104,6 +105,54 @@ impl Viewport {
         self.eye = Eye::of_photo(&photo.camera, &scene.home, self.up(scene));
         self.photo = Some(PhotoView::new(index, photo, tasks));
         self.moved_at = now;
+    }
+
+    /// Looks through the camera of a photo as long as a mode or the comparison needs one: then the eye comes back.
+    pub(crate) fn visit_photo(&mut self, index: usize, state: &AppState, tasks: &Tasks, compared: bool, now: f64) {
+        let before = (self.eye.clone(), compared);
+        self.look_through(index, state, tasks, now);
+        self.photo.iter_mut().for_each(|photo| photo.came_from = Some(before.clone()));
+    }
+
+    /// Comes back from a photo that was visited for a mode or the comparison, once nothing needs it.
+    pub(super) fn come_back(&mut self, layout: &Layout, now: f64) {
+        let modes = [Some(layout.mode), layout.split_view.then_some(layout.second_mode)];
+        let needs =
+            |compared: bool| modes.iter().flatten().any(|mode| mode.needs_photo()) || layout.compare && !compared;
+        let visit = self.photo.as_ref().and_then(|photo| photo.came_from.clone());
+        if let Some((eye, _)) = visit.filter(|(_, compared)| !needs(*compared)) {
+            self.photo = None;
+            self.eye = eye;
+            self.moved_at = now;
+        }
+    }
+
+    /// True if the middle of `bounds` is in the frame on screen.
+    pub(crate) fn sees(&self, bounds: &Bounds) -> bool {
+        let camera = self.camera();
+        let size = DVec2::new(f64::from(camera.width_px), f64::from(camera.height_px));
+        camera.project(bounds.center()).is_some_and(|p| p.cmpge(DVec2::ZERO).all() && p.cmple(size).all())
+    }
+
+    /// Keeps `bounds` in the views of the next frame, which may be of another shape.
+    pub(crate) fn ask_for(&mut self, bounds: Bounds) {
+        self.asked_for = Some(bounds);
+    }
+
+    /// Turns to `bounds` if not all of it is in a view of this size.
+    pub(super) fn keep_in_view(&mut self, bounds: &Bounds, view: egui::Vec2, now: f64) {
+        // All of a photo's frame is always shown.
+        if self.photo.as_ref().is_some_and(|photo| is_in_view(photo.camera(), bounds, 0.0)) {
+            return;
+        }
+        let before = self.eye.clone();
+        let fov = self.photo.as_ref().map(|photo| photo.free_fov(before.fov_y_rad));
+        let mut eye = Eye { fov_y_rad: fov.unwrap_or(before.fov_y_rad), ..before };
+        if eye.turn_to(bounds, f64::from(view.x / view.y.max(1.0))) {
+            self.photo = None;
+            self.eye = eye;
+            self.moved_at = now;
+        }
     }
 
     /// Moves the camera to a pose.
@@ -161,15 +210,12 @@ impl Viewport {
         made.map(|made| rest.measurements.push(made)).is_some()
     }
 
-    /// Begins or ends the edit of the crop box; there is one from then on.
+    /// Begins or ends the edit of the crop box; without one, a box is offered.
     pub(crate) fn crop(&mut self, state: &AppState) {
         let in_use = matches!(self.tool, Some(Tool::Crop(_)));
         self.toggle(in_use, state, |view, scene| {
-            let crop = view.visibility.crop();
-            let crop =
-                crop.unwrap_or_else(|| CropTool::first_box(view.cloud.as_ref().map(|c| &***c), &scene.home.bounds));
-            view.visibility.set_crop(Some(crop));
-            Tool::Crop(CropTool)
+            let (cloud, eye) = (view.cloud.as_ref().map(|c| &***c), view.camera());
+            Tool::Crop(CropTool::new(cloud, &scene.home.bounds, &eye, view.eye.pivot))
         });
     }
 

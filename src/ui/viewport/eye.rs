@@ -121,6 +121,24 @@ impl Eye {
         self.center = self.pivot - self.forward() * HomeView::distance(bounds, self.fov_y_rad);
     }
 
+    /// Turns to `bounds`, and steps back as far as needed, unless a view of this aspect ratio (width / height) shows all
+    /// of it. Returns true if it has moved.
+    pub(super) fn turn_to(&mut self, bounds: &Bounds, aspect: f64) -> bool {
+        let camera = self.camera((1000.0 * aspect).round() as u32, 1000);
+        if is_in_view(&camera, bounds, 0.0) {
+            return false;
+        }
+        let middle = bounds.center();
+        // Parallel rays keep their direction.
+        if !self.is_orthographic() {
+            self.look_along(middle - self.center);
+        }
+        let narrow = 2.0 * ((0.5 * self.fov_y_rad).tan() * aspect.min(1.0)).atan();
+        let ahead = (middle - self.center).dot(self.forward()).max(HomeView::distance(bounds, narrow));
+        (self.pivot, self.center) = (middle, middle - self.forward() * ahead);
+        true
+    }
+
     /// The first view of a scene: from its first camera if it has one, else framed as a whole; upright if the user
     /// chose the up direction.
     pub(crate) fn home(home: &HomeView, up: Option<DVec3>) -> Self {
@@ -183,6 +201,13 @@ impl Eye {
         let Some(right) = (m.x_axis - forward * m.x_axis.dot(forward)).try_normalize() else { return };
         self.world_from_eye = DMat3::from_cols(right, forward.cross(right), forward);
     }
+}
+
+/// True if a camera sees all corners, none of them at a border of its picture; `border` is a share of its size.
+pub(super) fn is_in_view(camera: &Camera, bounds: &Bounds, border: f64) -> bool {
+    let size = DVec2::new(f64::from(camera.width_px), f64::from(camera.height_px));
+    let is_in = |p: DVec2| p.cmpge(border * size).all() && p.cmple((1.0 - border) * size).all();
+    bounds.corners().into_iter().all(|p| camera.project(p).is_some_and(is_in))
 }
 
 #[cfg(test)]
@@ -257,6 +282,29 @@ mod tests {
         let from = e.center;
         e.fly(DVec3::new(0.0, 1.0, 0.0));
         assert!((e.center - from).dot(e.up) > 0.0, "up is up");
+    }
+
+    #[test]
+    fn a_thing_that_a_narrow_view_cuts_is_turned_to() {
+        let thing = Bounds { min: DVec3::new(0.7, -0.1, -0.1), max: DVec3::new(0.9, 0.1, 0.1) };
+        let sees = |e: &Eye, aspect: f64| {
+            let camera = e.camera((600.0 * aspect) as u32, 600);
+            let is_in = |p: DVec2| (0.0..600.0 * aspect).contains(&p.x) && (0.0..600.0).contains(&p.y);
+            thing.corners().into_iter().all(|p| camera.project(p).is_some_and(is_in))
+        };
+        for (orthographic, nearer) in [(false, 0.5), (true, 0.5), (false, 0.0)] {
+            let mut e = eye();
+            e.set_orthographic(orthographic);
+            e.zoom(e.pivot, 1.0 - nearer);
+            let (before, forward) = (e.clone(), e.forward());
+            if !orthographic {
+                assert!(!e.turn_to(&thing, 3.0) && e == before, "control: a wide view shows it as it is");
+            }
+            assert!(!sees(&e, 0.4) && e.turn_to(&thing, 0.4) && sees(&e, 0.4));
+            assert_eq!(e.center != before.center && e.forward() == forward, orthographic, "it turns where it stands");
+            assert!(!e.turn_to(&thing, 0.4), "once is enough");
+            assert!(e.world_from_eye.y_axis.dot(e.up) < 0.0, "upright");
+        }
     }
 
     #[test]

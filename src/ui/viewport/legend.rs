@@ -27,14 +27,18 @@ pub(super) fn show(
     ui: &mut Ui,
     settings: &mut OverlaySettings,
     depth: Option<(f32, f32)>,
+    is_orthographic: bool,
     shares: Option<[f64; 2]>,
     photo: Option<&str>,
     cx: &mut Ctx<'_>,
 ) {
     ui.vertical(|ui| {
         if let Some((near, far)) = depth {
-            ui.label(RichText::new("Depth, units").small());
-            bar(ui, Colormap::Turbo, [near, far].map(|d| format!("{d:.2}")));
+            // The camera of an orthographic view is far away, and its distance means nothing.
+            let (text, from) =
+                if is_orthographic { ("Depth from the nearest point, units", near) } else { ("Depth, units", 0.0) };
+            ui.label(RichText::new(text).small());
+            bar(ui, Colormap::Turbo, [near, far].map(|d| format!("{:.2}", d - from)));
         }
         let meaning = match settings.color_by {
             ColorBy::Masks => return,
@@ -85,7 +89,7 @@ fn show_unknown(ui: &mut Ui, share: Option<f64>, photo: Option<&str>, cx: &mut C
             None => "Unknown".to_owned(),
             Some(share) => format!("{} of this view is unknown", format::percent(share)),
         };
-        let why = "No mask and no photo says whose it is. Without a color: masks say that it is nobody's.";
+        let why = "No mask or photo decides which object it belongs to. Pixels without a color belong to none.";
         ui.label(RichText::new(text).small()).on_hover_text(why);
     });
     let mark = share.filter(|s| *s > 0.0).map(|_| ("Mark it\u{2026}", Action::SegmentNew(Some(NO_IDENTITY))));

@@ -1,6 +1,6 @@
 //! Measurements drawn over the view, with labels that do not cover each other.
 
-use egui::{Color32, FontId, Painter, Pos2, Rect, Shape, Stroke, Ui, Vec2, vec2};
+use egui::{Color32, Context, FontId, Order, Painter, Pos2, Rect, Shape, Stroke, Ui, Vec2, vec2};
 use glam::DVec3;
 
 use crate::math::format;
@@ -35,6 +35,11 @@ impl DrawnMeasurement {
     pub(super) fn kept(of: &Measurement, meters: Option<f64>) -> Self {
         let label = Some(format!("{}: {}", of.name, of.text(meters)));
         Self { kind: of.kind, points: of.points.clone(), label, is_new: false }
+    }
+
+    /// True if it is the same as a kept one.
+    pub(super) fn is_of(&self, kept: &Measurement) -> bool {
+        self.kind == kept.kind && self.points == kept.points
     }
 
     /// Its lines in the world.
@@ -88,11 +93,12 @@ fn edges(of: &UprightBox) -> Vec<[DVec3; 2]> {
     [along(a, b, c), along(b, a, c), along(c, a, b)].concat()
 }
 
-/// Draws measurements over the frame in `shown`, as `eye` sees them.
+/// Draws measurements over the frame in `shown`, as `eye` sees them. Labels of the first ones come first: one that has
+/// no place, or whose place is under a card, is left out.
 pub(super) fn show(ui: &Ui, shown: Rect, eye: &Camera, all: &[DrawnMeasurement], meters: Option<f64>) {
     let painter = ui.painter_at(shown);
     let place = |p: DVec3| eye.project(p).map(|q| shown.min + vec2(q.x as f32, q.y as f32)).filter(|p| p.is_finite());
-    let mut labels = Vec::new();
+    let (mut labels, cards) = (Vec::new(), cards_over(ui.ctx(), shown));
     for one in all {
         let color = if one.is_new { theme::warning() } else { theme::accent() };
         for [a, b] in one.lines() {
@@ -108,12 +114,21 @@ pub(super) fn show(ui: &Ui, shown: Rect, eye: &Camera, all: &[DrawnMeasurement],
             }
         }
         let seen = one.labels(meters).into_iter().filter_map(|(p, text)| Some((place(p)?, text, color)));
-        labels.extend(seen.filter(|(at, ..)| shown.contains(*at)));
+        labels.extend(seen.filter(|(at, ..)| shown.contains(*at) && !cards.iter().any(|card| card.contains(*at))));
     }
-    show_labels(&painter, shown, labels);
+    show_labels(&painter, shown, cards, labels);
 }
 
-fn show_labels(painter: &Painter, shown: Rect, labels: Vec<(Pos2, String, Color32)>) {
+/// Rectangles of the cards over the view, as of the last frame.
+fn cards_over(ctx: &Context, shown: Rect) -> Vec<Rect> {
+    ctx.memory(|m| {
+        let all = m.areas().visible_layer_ids().into_iter();
+        let cards = all.filter(|layer| matches!(layer.order, Order::Middle | Order::Foreground));
+        cards.filter_map(|layer| m.area_rect(layer.id)).filter(|card| card.intersects(shown)).collect()
+    })
+}
+
+fn show_labels(painter: &Painter, shown: Rect, cards: Vec<Rect>, labels: Vec<(Pos2, String, Color32)>) {
     let ink = Color32::from_gray(240);
     let galleys: Vec<_> = labels
         .iter()
@@ -121,7 +136,9 @@ fn show_labels(painter: &Painter, shown: Rect, labels: Vec<(Pos2, String, Color3
         .collect();
     let wanted: Vec<(Pos2, Vec2)> =
         labels.iter().zip(&galleys).map(|((at, ..), galley)| (*at, galley.size() + vec2(10.0, 6.0))).collect();
-    for ((rect, galley), (at, _, color)) in beside(&wanted, shown.shrink(4.0)).into_iter().zip(galleys).zip(labels) {
+    let places = beside(&wanted, shown.shrink(4.0), cards);
+    for ((rect, galley), (at, _, color)) in places.into_iter().zip(galleys).zip(labels) {
+        let Some(rect) = rect else { continue };
         let nearest = rect.clamp(at);
         if nearest.distance(at) > BESIDE + 2.0 {
             painter.add(Shape::line_segment([at, nearest], Stroke::new(1.0, color)));
@@ -131,8 +148,9 @@ fn show_labels(painter: &Painter, shown: Rect, labels: Vec<(Pos2, String, Color3
     }
 }
 
-/// Rectangles of these sizes beside their places, within `room`, none over another as long as there is room.
-fn beside(wanted: &[(Pos2, Vec2)], room: Rect) -> Vec<Rect> {
+/// Rectangles of these sizes beside their places, within `room`, none over another or over one that is `taken`; `None`
+/// where there is no room.
+fn beside(wanted: &[(Pos2, Vec2)], room: Rect, mut taken: Vec<Rect>) -> Vec<Option<Rect>> {
     const WAYS: [Vec2; 8] = [
         vec2(1.0, 0.0),
         vec2(0.0, 1.0),
@@ -143,18 +161,16 @@ fn beside(wanted: &[(Pos2, Vec2)], room: Rect) -> Vec<Rect> {
         vec2(-1.0, 1.0),
         vec2(-1.0, -1.0),
     ];
-    let mut placed: Vec<Rect> = Vec::new();
-    for (at, size) in wanted {
+    let place = |(at, size): &(Pos2, Vec2)| {
         let near = |way: Vec2, gap: f32| Rect::from_center_size(*at + way * (0.5 * *size + Vec2::splat(gap)), *size);
         let places = (0..12).flat_map(|ring| WAYS.map(|way| near(way, BESIDE + 20.0 * ring as f32)));
         let is_free =
-            |rect: &Rect| room.contains_rect(*rect) && placed.iter().all(|other| !other.expand(1.0).intersects(*rect));
-        let first = near(WAYS[0], BESIDE);
-        let moved =
-            first.translate(room.min - first.min.min(room.min)).translate((room.max - first.max).min(Vec2::ZERO));
-        placed.push(places.into_iter().find(is_free).unwrap_or(moved));
-    }
-    placed
+            |rect: &Rect| room.contains_rect(*rect) && taken.iter().all(|other| !other.expand(1.0).intersects(*rect));
+        let found = places.into_iter().find(is_free);
+        taken.extend(found);
+        found
+    };
+    wanted.iter().map(place).collect()
 }
 
 #[cfg(test)]
@@ -167,7 +183,7 @@ mod tests {
     fn labels_at_one_place_do_not_cover_each_other() {
         let room = Rect::from_min_size(Pos2::ZERO, vec2(400.0, 300.0));
         let crowd = vec![(pos2(200.0, 150.0), vec2(90.0, 20.0)); 12];
-        let placed = beside(&crowd, room);
+        let placed: Vec<Rect> = beside(&crowd, room, Vec::new()).into_iter().flatten().collect();
         let overlaps = |all: &[Rect]| {
             (0..all.len())
                 .flat_map(|i| (0..i).map(move |k| (i, k)))
@@ -177,11 +193,36 @@ mod tests {
         assert_eq!((placed.len(), overlaps(&placed)), (12, 0));
         assert!(placed.iter().all(|rect| room.contains_rect(*rect)));
         // Control: each alone would stand where the first one does.
-        let alone: Vec<Rect> = crowd.iter().map(|one| beside(&[*one], room)[0]).collect();
+        let alone: Vec<Rect> = crowd.iter().filter_map(|one| beside(&[*one], room, Vec::new())[0]).collect();
         assert_eq!(overlaps(&alone), 66);
-        let corner = beside(&[(pos2(398.0, 1.0), vec2(90.0, 20.0))], room);
-        assert!(room.contains_rect(corner[0]), "at the border");
-        assert_eq!(beside(&[(Pos2::ZERO, vec2(500.0, 400.0)); 3], room).len(), 3, "without room they are still there");
+        let corner = beside(&[(pos2(398.0, 1.0), vec2(90.0, 20.0))], room, Vec::new());
+        assert!(corner[0].is_some_and(|corner| room.contains_rect(corner)), "at the border");
+    }
+
+    #[test]
+    fn labels_keep_off_cards_and_those_without_room_are_left_out() {
+        let room = Rect::from_min_size(Pos2::ZERO, vec2(400.0, 300.0));
+        let (one, card) =
+            ((pos2(200.0, 150.0), vec2(90.0, 20.0)), Rect::from_min_size(pos2(205.0, 0.0), vec2(195.0, 300.0)));
+        let free = beside(&[one], room, Vec::new())[0].expect("there is room");
+        assert!(free.intersects(card), "control: without the card it would stand there");
+        let kept_off = beside(&[one], room, vec![card])[0].expect("there is room on the other side");
+        assert!(!kept_off.intersects(card) && room.contains_rect(kept_off));
+        // In a narrow room the first ones have places.
+        let narrow = Rect::from_center_size(one.0, vec2(200.0, 100.0));
+        let placed = beside(&[one; 40], narrow, Vec::new());
+        assert!(placed[0].is_some() && placed.iter().flatten().count() < 10, "{placed:?}");
+        assert_eq!(beside(&[one], narrow, vec![room]), [None]);
+    }
+
+    #[test]
+    fn a_measurement_that_was_kept_is_known_again() {
+        let points = vec![DVec3::ZERO, DVec3::X];
+        let drawn = DrawnMeasurement::new(MeasurementKind::Length, points.clone(), None);
+        let kept = |kind, points| Measurement { id: 1, name: "a".into(), kind, points, hidden: false };
+        assert!(drawn.is_of(&kept(MeasurementKind::Length, points.clone())));
+        assert!(!drawn.is_of(&kept(MeasurementKind::Area, points)));
+        assert!(!drawn.is_of(&kept(MeasurementKind::Length, vec![DVec3::ZERO, DVec3::Y])), "another line");
     }
 
     #[test]

@@ -45,7 +45,7 @@ use crate::jobs::OpenedScene;
 use crate::navigate::Pose;
 use crate::render::GpuError;
 use crate::scene::measurement::Measurement;
-use crate::scene::{Camera, GaussianCloud, PhotoPixels};
+use crate::scene::{Bounds, Camera, GaussianCloud, PhotoPixels};
 use crate::worker::view::{RenderThread, ViewPicture};
 use crate::worker::{CloudSnapshot, Repaint, Tasks, Versioned};
 
@@ -76,6 +76,10 @@ pub struct Viewport {
     marks: Marks,
     /// Measurements of the scene.
     pub measurements: Vec<Measurement>,
+    /// Bounds to keep in view once the views have their shape.
+    asked_for: Option<Bounds>,
+    /// True if the next scene is shown from where the eye is, with the same queries.
+    keeps_place: bool,
     /// The tool in use.
     tool: Option<Tool>,
     /// Preparation for selections in this scene.
@@ -105,6 +109,8 @@ impl Viewport {
             picking: Picking::default(),
             marks: Marks::default(),
             measurements: Vec::new(),
+            asked_for: None,
+            keeps_place: false,
             tool: None,
             preparation: SelectionPreparation::default(),
             overrides: RenderOverrides::default(),
@@ -190,6 +196,11 @@ impl Viewport {
         self.preparation.times()
     }
 
+    /// Shows the next scene from where the eye is, with the same queries: it is of the same place.
+    pub(crate) fn keep_place(&mut self) {
+        self.keeps_place = true;
+    }
+
     /// True if it shows the scene of this number.
     pub(crate) fn is_of(&self, scene_number: u64) -> bool {
         self.scene == scene_number
@@ -203,19 +214,23 @@ impl Viewport {
     pub(crate) fn update(&mut self, state: &mut AppState, tasks: &Tasks) {
         if let Some(scene) = state.scene.as_ref().filter(|_| state.scene_number != self.scene) {
             self.scene = state.scene_number;
-            self.photo = None;
+            let keeps_place = std::mem::take(&mut self.keeps_place);
+            self.leave_photo();
+            self.asked_for = None;
             self.preparation.forget(tasks);
             self.requests.forget();
             self.display.clear();
             self.set_cloud(scene.gaussians().cloned());
-            self.up = None;
-            self.queries.clear();
+            self.queries.change_scene(state.semantics.as_deref().filter(|_| keeps_place).map(|map| &**map));
             self.visibility = Visibility::default();
             self.picking = Picking::default();
             self.measurements.clone_from(&scene.measurements);
             self.tool = None;
             self.overrides = RenderOverrides::default();
-            self.eye = Eye::home(&scene.home, None);
+            if !keeps_place {
+                self.up = None;
+                self.eye = Eye::home(&scene.home, None);
+            }
         }
         if let Some((generation, snapshot)) = tasks.clouds().newer_than(self.snapshot) {
             self.snapshot = generation;

@@ -51,6 +51,8 @@ pub(super) struct ViewCards<'a> {
     pub(super) gaussians: usize,
     pub(super) visibility: &'a Visibility,
     pub(super) overrides: &'a RenderOverrides,
+    /// Words for the view, if it is orthographic.
+    pub(super) orthographic: Option<String>,
     pub(super) queries: &'a mut Queries,
     /// True if the camera moves.
     pub(super) moves: bool,
@@ -78,7 +80,16 @@ impl ViewCards<'_> {
             // Above the facts if there is no room beside them.
             let up = if rect.width() < NARROW_BESIDE_FACTS { -46.0 } else { 0.0 };
             card(ui, rect, legend, Align2::RIGHT_BOTTOM, up, |ui| {
-                legend::show(ui, self.queries.settings(), depth, shares, can_segment.then_some(segment), cx);
+                let is_orthographic = self.orthographic.is_some();
+                legend::show(
+                    ui,
+                    self.queries.settings(),
+                    depth,
+                    is_orthographic,
+                    shares,
+                    can_segment.then_some(segment),
+                    cx,
+                );
             });
         }
         if second {
@@ -104,8 +115,15 @@ impl ViewCards<'_> {
         // Overrides of the scene's render settings must be visible in the smallest view.
         let words = self.overrides.words();
         let is_cropped = self.visibility.crop().is_some();
-        if facts.is_some() || words.is_some() || is_cropped {
+        if facts.is_some() || words.is_some() || is_cropped || self.orthographic.is_some() {
             card(ui, rect, "facts", Align2::LEFT_BOTTOM, 0.0, |ui| {
+                if let Some(straight) = &self.orthographic {
+                    ui.label(RichText::new(straight).small().color(theme::accent()));
+                    let tip = keys::label(ui.ctx(), &Action::Orthographic);
+                    if ui.small_button("Perspective").on_hover_text(tip).clicked() {
+                        cx.ask(Action::Orthographic);
+                    }
+                }
                 if let Some(facts) = &facts {
                     ui.label(RichText::new(facts).small().color(theme::weak()));
                 }
@@ -255,11 +273,13 @@ impl ViewCards<'_> {
         let (p, state, layout) = (self.display.picture()?, cx.state, &*cx.layout);
         let drawn_px = vec2(p.camera.width_px as f32, p.camera.height_px as f32);
         let enlarged = (view_px / drawn_px).min_elem();
+        let has_result = state.training_job.is_some() || state.scene.as_ref().is_some_and(|s| s.trained);
         let mut parts = vec![
             format!("{} \u{d7} {} px", p.camera.width_px, p.camera.height_px)
                 + if p.full && enlarged > 1.05 { ", enlarged" } else { "" },
             format::millis(p.secs),
             match (self.visibility.count(), self.gaussians as u64) {
+                (None, all) if !has_result => format!("{} sparse points, not trained yet", format::count(all)),
                 (Some(drawn), all) => format!("{} of {} Gaussians", format::count(drawn as u64), format::count(all)),
                 (None, all) => format!("{} Gaussians", format::count(all)),
             },
@@ -271,10 +291,6 @@ impl ViewCards<'_> {
             }
             Some(_) if modes.contains(&Some(ViewMode::Difference)) => parts.push("difference \u{d7} 4".into()),
             _ => {}
-        }
-        let trained = state.training_job.is_some() || state.scene.as_ref().is_some_and(|s| s.trained);
-        if !trained {
-            parts.push("sparse points, not trained yet".into());
         }
         parts.extend(rate);
         Some(parts.join("  ·  "))

@@ -3,11 +3,15 @@
 use std::borrow::Cow;
 use std::sync::Arc;
 
-use egui::{Color32, ColorImage, CursorIcon, Rect, Sense, Stroke, TextureHandle, TextureOptions, Ui, pos2, vec2};
+use egui::{
+    Align2, Color32, ColorImage, CursorIcon, Pos2, Rect, Sense, Stroke, TextureHandle, TextureId, TextureOptions, Ui,
+    pos2, vec2,
+};
 
+use super::eye::Eye;
 use crate::scene::{Camera, Photo, PhotoPixels};
 use crate::ui::theme;
-use crate::worker::{Task, Tasks, ViewMode, load_photo};
+use crate::worker::{Task, Tasks, load_photo};
 
 /// Step of an arrow key at the split between photo and rendering, as a share of the frame.
 const KEY_STEP: f32 = 0.05;
@@ -26,6 +30,8 @@ pub(super) struct PhotoView {
     failed: bool,
     /// Height of the viewport relative to the frame in it.
     margin: f64,
+    /// The eye before a mode or the comparison went to the photo, and whether the comparison was on then.
+    pub(super) came_from: Option<(Eye, bool)>,
 }
 
 impl PhotoView {
@@ -33,7 +39,7 @@ impl PhotoView {
         // With a full queue there is no photo to compare with until the next visit.
         let task = if photo.has_pixels() { load_photo(tasks, index, photo, SIDE_PX).ok() } else { None };
         let failed = task.is_none();
-        Self { index, photo: photo.clone(), task, pixels: None, texture: None, failed, margin: 1.0 }
+        Self { index, photo: photo.clone(), task, pixels: None, texture: None, failed, margin: 1.0, came_from: None }
     }
 
     pub(super) fn index(&self) -> usize {
@@ -78,18 +84,42 @@ impl PhotoView {
         (2.0 * ((0.5 * fov_y_rad).tan() * self.margin).atan()).clamp(0.1, 2.2)
     }
 
-    /// Draws the photo right of the split, and the handle of the split; the rendering on the left shows `mode`.
-    pub(super) fn show_split(&mut self, ui: &mut Ui, shown: Rect, mode: ViewMode, split: &mut f32) {
-        let Some(pixels) = &self.pixels else { return };
+    /// The photo as a texture, once it is loaded.
+    fn texture(&mut self, ui: &Ui) -> Option<TextureId> {
+        let pixels = self.pixels.as_ref()?;
         let texture = self.texture.get_or_insert_with(|| {
             let size = [pixels.width_px as usize, pixels.height_px as usize];
             let colors = pixels.rgb.iter().map(|&[r, g, b]| Color32::from_rgb(r, g, b)).collect();
             ui.ctx().load_texture("photo", ColorImage::new(size, colors), TextureOptions::LINEAR)
         });
+        Some(texture.id())
+    }
+
+    /// Draws the photo in place of a rendering, which there is not yet.
+    pub(super) fn show_alone(&mut self, ui: &mut Ui, shown: Rect) {
+        let texture = self.texture(ui);
+        let text = match texture {
+            Some(_) => "Photo: there are no Gaussians yet",
+            None if self.failed => "The photo is not loaded, and there are no Gaussians yet",
+            None => "Loading the photo\u{2026}",
+        };
+        if let Some(texture) = texture {
+            let uv = Rect::from_min_max(pos2(0.0, 0.0), pos2(1.0, 1.0));
+            ui.painter().image(texture, shown, uv, Color32::WHITE);
+        }
+        caption(ui, shown.center_bottom() - vec2(0.0, 12.0), text, Align2::CENTER_BOTTOM);
+        let rect = Rect::from_center_size(shown.center_bottom(), vec2(1.0, 1.0));
+        ui.interact(rect, ui.scope_id().with("photo alone"), Sense::empty())
+            .widget_info(|| egui::WidgetInfo::labeled(egui::Role::Label, true, text));
+    }
+
+    /// Draws the photo right of the split, and the handle of the split; `left` names what is on the left.
+    pub(super) fn show_split(&mut self, ui: &mut Ui, shown: Rect, left: &str, split: &mut f32) {
+        let Some(texture) = self.texture(ui) else { return };
         let x = shown.left() + shown.width() * *split;
         let right = Rect::from_min_max(pos2(x, shown.top()), shown.max);
         let uv = Rect::from_min_max(pos2(*split, 0.0), pos2(1.0, 1.0));
-        ui.painter().image(texture.id(), right, uv, Color32::WHITE);
+        ui.painter().image(texture, right, uv, Color32::WHITE);
         let grip = Rect::from_center_size(pos2(x, shown.center().y), vec2(16.0, shown.height()));
         let response =
             ui.interact(grip, ui.scope_id().with("split"), Sense::drag()).on_hover_cursor(CursorIcon::ResizeHorizontal);
@@ -111,13 +141,15 @@ impl PhotoView {
         };
         ui.painter().vline(x, shown.y_range(), Stroke::new(1.5, color));
         ui.painter().circle(pos2(x, shown.center().y), 9.0, theme::panel(), Stroke::new(1.5, color));
-        let left = if mode == ViewMode::Rgb { "Rendering" } else { mode.text() };
-        for (side, text, align) in [(-1.0, left, egui::Align2::RIGHT_BOTTOM), (1.0, "Photo", egui::Align2::LEFT_BOTTOM)]
-        {
-            let at = pos2(x + side * 10.0, shown.bottom() - 12.0);
-            let font = egui::FontId::proportional(12.5);
-            ui.painter().text(at + vec2(1.0, 1.0), align, text, font.clone(), Color32::BLACK);
-            ui.painter().text(at, align, text, font, Color32::WHITE);
+        for (side, text, align) in [(-1.0, left, Align2::RIGHT_BOTTOM), (1.0, "Photo", Align2::LEFT_BOTTOM)] {
+            caption(ui, pos2(x + side * 10.0, shown.bottom() - 12.0), text, align);
         }
     }
+}
+
+/// Draws words over a picture.
+fn caption(ui: &Ui, at: Pos2, text: &str, align: Align2) {
+    let font = egui::FontId::proportional(12.5);
+    ui.painter().text(at + vec2(1.0, 1.0), align, text, font.clone(), Color32::BLACK);
+    ui.painter().text(at, align, text, font, Color32::WHITE);
 }

@@ -17,6 +17,7 @@ use super::visible::VisibleCloud;
 use super::{Viewport, frusta, query, route};
 use crate::pipeline::semantics::query::language::QueryPlace;
 use crate::pipeline::semantics::query::language::viewpoint::Viewpoint;
+use crate::scene::measurement::Measurement;
 use crate::ui::ctx::Ctx;
 use crate::ui::select_shape::SelectShape;
 use crate::worker::ViewMode;
@@ -53,6 +54,10 @@ impl Viewport {
         if self.steering.steer(ui, &response, &mut self.eye, &steered) {
             self.leave_photo();
             self.moved_at = now;
+        }
+        self.come_back(cx.layout, now);
+        if let Some(bounds) = self.asked_for.take() {
+            self.keep_in_view(&bounds, views.first.size(), now);
         }
         let shown = self.fit(views.first);
         self.request(ui, shown, now, cx);
@@ -133,8 +138,20 @@ impl Viewport {
                 let lit = cx.layout.dim.then(|| self.picking.selected().into_iter().collect());
                 self.queries.paint(ui, area.shown, semantics, lit);
             }
-            if let Some(photo) = self.photo.as_mut().filter(|_| cx.layout.compare && !area.second) {
-                photo.show_split(ui, area.shown, cx.layout.mode, &mut cx.layout.split);
+            let has_result = state.is_trained() || state.is_training();
+            if let Some(photo) = self.photo.as_mut().filter(|_| !area.second) {
+                match cx.layout.mode {
+                    mode if cx.layout.compare => {
+                        let of = match mode {
+                            ViewMode::Rgb if has_result => "Rendering",
+                            ViewMode::Rgb => "Sparse points",
+                            other => other.text(),
+                        };
+                        photo.show_split(ui, area.shown, of, &mut cx.layout.split);
+                    }
+                    ViewMode::Rgb if !has_result => photo.show_alone(ui, area.shown),
+                    _ => {}
+                }
             }
             if with_cameras {
                 let eye = self.display.overlay_camera(&self.eye, area.rect);
@@ -163,7 +180,8 @@ impl Viewport {
                 tool.paint(ui, area, &mut rest, cx);
             }
             // A path that plays is shown as a video of it would be.
-            if !area.is_other && !route.is_some_and(|route| route.plays) {
+            let measures = cx.layout.measurements || self.is_measuring();
+            if measures && !area.is_other && !route.is_some_and(|route| route.plays) {
                 self.show_measurements(ui, area, cx);
             }
             let searched = state.semantics.as_ref().zip(self.cloud.as_ref()).filter(|_| !area.is_other);
@@ -187,6 +205,7 @@ impl Viewport {
                 gaussians: self.cloud.as_ref().map_or(0, |cloud| cloud.len()),
                 visibility: &self.visibility,
                 overrides: &self.overrides,
+                orthographic: self.eye.straight_name(state.scene.as_ref().map(|scene| &scene.home)),
                 queries: &mut self.queries,
             };
             cards.show(ui, area.rect, cx);
@@ -211,7 +230,10 @@ impl Viewport {
             Some(Tool::Ruler(ruler)) => Some(ruler.drawn(&rest, cx.state)),
             _ => None,
         };
-        let kept = rest.measurements.iter().filter(|m| !m.hidden).map(|m| DrawnMeasurement::kept(m, meters));
+        let kept: Vec<&Measurement> = rest.measurements.iter().filter(|m| !m.hidden).collect();
+        // One that was just kept is drawn once, with its name.
+        let new = new.filter(|new| !kept.iter().any(|kept| new.is_of(kept)));
+        let kept = kept.into_iter().rev().map(|m| DrawnMeasurement::kept(m, meters));
         let all: Vec<DrawnMeasurement> = new.into_iter().chain(kept).collect();
         measured::show(ui, area.shown, &rest.camera(area.shown), &all, meters);
     }

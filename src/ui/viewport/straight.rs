@@ -2,7 +2,11 @@
 
 use glam::DVec3;
 
+use strum::VariantArray;
+
 use super::eye::Eye;
+use crate::math::format;
+use crate::scene::HomeView;
 use crate::ui::actions::Face;
 
 /// Field of view of the orthographic view: a camera so far off that its rays are parallel but for a thousandth, at which
@@ -59,6 +63,21 @@ impl Eye {
         self.center += self.forward() * (depth - left);
     }
 
+    /// Words for an orthographic view, with the side that it is from; `None` with perspective.
+    pub(super) fn straight_name(&self, home: Option<&HomeView>) -> Option<String> {
+        if !self.is_orthographic() {
+            return None;
+        }
+        let ahead = front_of(home);
+        let is_from = |face: &&Face| {
+            let mut straight = self.clone();
+            straight.look_from(**face, ahead);
+            straight.forward().dot(self.forward()) > 1.0 - 1e-6
+        };
+        let side = Face::VARIANTS.iter().find(is_from).map(|face| format!(" \u{b7} {}", format::capital(face.into())));
+        Some(format!("Orthographic{}", side.unwrap_or_default()))
+    }
+
     /// Looks at the pivot from a side of the scene, whose front is seen along `ahead`.
     pub(crate) fn look_from(&mut self, face: Face, ahead: DVec3) {
         let Some(up) = self.up.try_normalize() else { return };
@@ -76,6 +95,11 @@ impl Eye {
         self.world_from_eye = glam::DMat3::from_cols(forward.cross(top), -top, forward);
         self.center = self.pivot - forward * depth;
     }
+}
+
+/// The direction in which the scene's first camera looks.
+pub(super) fn front_of(home: Option<&HomeView>) -> DVec3 {
+    home.and_then(|home| home.camera.as_ref()).map_or(DVec3::Y, |camera| camera.forward())
 }
 
 /// The direction of the scene's front: the level world axis that is nearest to `ahead`, or `ahead` itself, level, if the
@@ -122,6 +146,19 @@ mod tests {
         let before = flat.clone();
         flat.set_orthographic(true);
         assert_eq!(flat, before);
+    }
+
+    #[test]
+    fn a_straight_view_is_named_by_its_side() {
+        let mut flat = eye();
+        assert_eq!(flat.straight_name(None), None, "with perspective");
+        for (face, name) in [(Face::Top, "Orthographic \u{b7} Top"), (Face::Left, "Orthographic \u{b7} Left")] {
+            flat.look_from(face, DVec3::Y);
+            flat.set_orthographic(true);
+            assert_eq!(flat.straight_name(None).as_deref(), Some(name));
+        }
+        flat.orbit(0.3, -0.1);
+        assert_eq!(flat.straight_name(None).as_deref(), Some("Orthographic"), "control: from no side");
     }
 
     #[test]

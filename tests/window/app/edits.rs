@@ -168,7 +168,7 @@ fn one_more_photo_is_segmented_and_that_is_taken_back() {
     assert!(said(w.app(), "were nobody's before"), "what came to be known is told");
     assert_eq!(name(w.app(), 1), "crate", "what was done by hand stays");
     w.ask(Action::Undo);
-    w.until("undone", |a| said(a, "Undone: segmented "));
+    w.until("undone", |a| said(a, "Undone: added objects from "));
     assert_eq!(name(w.app(), 1), "crate");
     w.ask(Action::Undo);
     w.until("the old name", |a| name(a, 1) != "crate");

@@ -32,7 +32,7 @@ fn export(w: &mut Window) {
 
 fn until_written(w: &mut Window, path: PathBuf) {
     let text = format!("Saved to {}", path.display());
-    w.until("it is written", |a| a.state.log.iter().any(|l| l.text == text));
+    w.until("it is written", |a| a.state.log.iter().any(|l| l.text.starts_with(&text)));
     assert!(path.exists() && !w.app().chooses_file());
 }
 
@@ -187,4 +187,60 @@ fn every_kind_of_file_has_a_folder_of_its_own() {
     }
     export(&mut w);
     assert_eq!(Path::new(&field(&w, "Folder")), at("splats"));
+}
+
+#[test]
+fn the_arrows_choose_a_format_and_enter_never_replaces_a_file() {
+    let folder = tempfile::tempdir().expect("folder");
+    let mut w = window(folder.path());
+    let at = folder.path().canonicalize().expect("there").join("dots.ply");
+    let before = std::fs::read(&at).expect("it was opened");
+    w.harness.key_press_modifiers(Modifiers::COMMAND, Key::E);
+    w.harness.run_steps(3);
+    w.press(Key::ArrowDown);
+    w.press(Key::Enter);
+    w.until("a dialog", |a| a.chooses_file());
+    w.harness.run_steps(3);
+    let name = field(&w, "File name");
+    assert!(name.starts_with("dots.") && name != "dots.ply", "the second format: {name}");
+    w.press(Key::Escape);
+    // Control: without an arrow, the first format. The file is there already.
+    export(&mut w);
+    assert_eq!(field(&w, "File name"), "dots.ply");
+    w.press(Key::Enter);
+    w.harness.run_steps(3);
+    assert!(w.shows("already exists. Replace it?"));
+    assert!(w.harness.get_by_label("Choose another name").accesskit_node().is_focused());
+    w.press(Key::Enter);
+    w.harness.run_steps(3);
+    assert!(w.app().chooses_file() && !w.shows("already exists"), "it goes on");
+    assert_eq!(std::fs::read(&at).expect("there"), before);
+}
+
+#[test]
+fn tab_completes_a_begun_name_and_then_leaves_the_field() {
+    let folder = tempfile::tempdir().expect("folder");
+    let mut w = window(folder.path());
+    ["kitchen-1", "kitchen-2", "photos"]
+        .iter()
+        .for_each(|name| std::fs::create_dir(folder.path().join(name)).expect("made"));
+    w.ask(Action::OpenFolder);
+    w.until("a dialog", |a| a.chooses_file());
+    for _ in 0..500 {
+        w.harness.step();
+        if w.shows("kitchen-1") {
+            break;
+        }
+        std::thread::sleep(std::time::Duration::from_millis(10));
+    }
+    let is_in =
+        |w: &Window| w.harness.get_by_role_and_label(Role::TextInput, "File name").accesskit_node().is_focused();
+    w.types("ki");
+    w.press(Key::Tab);
+    assert_eq!((field(&w, "File name").as_str(), is_in(&w)), ("kitchen-", true), "both go on so");
+    w.types("2");
+    w.press(Key::Tab);
+    assert_eq!((field(&w, "File name").as_str(), is_in(&w)), ("kitchen-2", false), "there is nothing to complete");
+    w.press(Key::Escape);
+    assert!(!w.app().chooses_file());
 }

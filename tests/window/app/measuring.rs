@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use egui::accesskit::Toggled;
 use egui::{Event, Key, Modifiers, PointerButton};
 use egui_kittest::kittest::{NodeT, Queryable};
 
@@ -135,6 +136,8 @@ fn a_turntable_plays_at_once_and_keys_go_in_at_the_playhead() {
     w.harness.run_steps(3);
     assert_eq!(keys(&w), 12);
     w.until("it plays", |a| center(a).distance(home) > 1e-3);
+    let loops = |w: &Window| w.harness.get_by_label("Loop").accesskit_node().toggled() == Some(Toggled::True);
+    assert!(loops(&w), "again and again");
     w.ask(Action::PlayPath);
     w.ask(Action::StepForward);
     let here = center(w.app());
@@ -147,4 +150,5 @@ fn a_turntable_plays_at_once_and_keys_go_in_at_the_playhead() {
     assert_eq!(keys(&w), 12);
     undo(&mut w);
     assert_eq!(keys(&w), 1, "one step brings the earlier path back");
+    assert!(!loops(&w), "which was not repeated");
 }

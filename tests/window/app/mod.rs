@@ -5,6 +5,7 @@ mod crop;
 mod demo;
 mod doubts;
 mod edits;
+mod elsewhere;
 mod files;
 mod hands;
 mod kept;
@@ -23,6 +24,7 @@ mod selecting;
 mod shapes;
 mod split;
 mod typing;
+mod views;
 
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
@@ -275,6 +277,8 @@ fn training_moves_the_plot_pauses_resumes_and_is_cancelled() {
     w.until("further steps", |a| last_step(a) > held);
 
     w.harness.key_press(egui::Key::Escape);
+    w.harness.run_steps(2);
+    w.click("Cancel it");
     w.until("the end", |a| a.state.job.is_none());
     assert!(w.app().state.error.is_none(), "{:?}", w.app().state.error);
     let reached = last_step(w.app());

@@ -60,7 +60,19 @@ fn a_scene_without_a_box_is_seen_beside_and_opened() {
     assert_eq!(std::fs::read(folder.path().join("scene/point_cloud.ply")).expect("the scene"), before);
     // What is shown now is the second one, from which more can be removed.
     w.ask(Action::Remove(1));
-    w.until("less again", |_| folder.path().join("scene-without-box-1-2-without-box-0/scene.json").is_file());
+    let third = folder.path().join("scene-without-box-1-2-without-box-0");
+    w.until("less again", |a| third.join("scene.json").is_file() && a.state.comparison.is_some());
+
+    // The one beside is deleted first, then the open one; the next in the list of recent scenes takes its place.
+    for gone in [&third, &again] {
+        w.ask(Action::DeleteRemoved);
+        w.harness.run_steps(2);
+        w.click("Delete");
+        w.until("it is gone", |a| !gone.exists() && a.state.job.is_none());
+    }
+    let first = folder.path().join("scene");
+    w.until("the first one", |a| a.state.scene.as_ref().is_some_and(|s| s.out == first) && a.state.job.is_none());
+    assert!(made.join("scene.json").is_file(), "the others stay");
 }
 
 #[test]

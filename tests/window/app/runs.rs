@@ -79,6 +79,9 @@ fn trainings_of_a_data_set_are_listed_opened_renamed_and_deleted() {
     w.harness.state_mut().layout.config.steps = 50_000;
     w.ask(Action::TrainAnew);
     w.until("a third training", |a| a.state.is_training() && a.state.history.steps.len() > 2);
+    w.until("its row", |a| runs(a) == ["sharp", "run-2", "run-3"]);
+    w.harness.run_steps(2);
+    assert!(is_marked(&w, "run-3") && !is_marked(&w, "sharp: 100 steps"));
     let third = first.with_file_name("run-3");
     w.ask(Action::DeleteRun(third.clone()));
     w.click("Delete");

@@ -195,7 +195,11 @@ fn a_selection_of_the_clean_pane_goes_on_by_hand() {
     w.harness.run_steps(4);
     let label = w.harness.get_by_label_contains(" Gaussians (").value().expect("how many are selected");
     let chosen = label.split(' ').next().and_then(|n| n.replace(',', "").parse::<usize>().ok()).expect("a number");
+    let has_delete = |w: &Window| w.harness.query_by_role_and_label(Role::Button, "Delete").is_some();
+    assert!(has_delete(&w) && !w.shows("Grow"), "changing a selection is left to the tool");
     w.harness.get_by_label("By hand\u{2026}").click();
+    w.harness.run_steps(3);
+    assert!(!has_delete(&w) && w.shows("Grow"), "now the tool has them");
     if chosen > 0 {
         assert_eq!(selected(&mut w), chosen);
     }

@@ -7,9 +7,10 @@ use std::sync::Arc;
 use super::{edits, remote, view};
 use crate::jobs::find_objects::{self, FindRequest, FindSettings};
 use crate::jobs::models::{self, Source};
+use crate::jobs::phases;
 use crate::jobs::remove::{self as removal, RemovalOptions, RemoveRequest};
 use crate::pipeline::observer::Observer;
-use crate::scene::{IdentityId, SemanticMap};
+use crate::scene::{Bounds, IdentityId, SemanticMap};
 use crate::ui::app::App;
 use crate::ui::dialogs::{DialogAnswer, Question};
 use crate::ui::file_dialogs::{FileFormat, FileRequest};
@@ -30,7 +31,7 @@ pub(in crate::ui) fn find(app: &mut App) {
     }
     // The user may have added files since the list was made.
     app.models = ModelsPane::default();
-    app.find_dialog.open();
+    app.find_dialog.open(&app.layout.finding);
 }
 
 pub(in crate::ui) fn choose_masks(app: &mut App) {
@@ -83,7 +84,7 @@ fn find_after(app: &mut App, mut search: PlannedSearch) {
             return;
         }
         if !is_installed {
-            let text = "Objects are not looked for: a model is missing. A download that was cut off goes on where it \
+            let text = "The search was not started: a model is missing. A download that was cut off goes on where it \
                         ended: find objects again.";
             return app.state.toast(Tone::Warning, text);
         }
@@ -136,7 +137,7 @@ pub(in crate::ui) fn segment_photo(app: &mut App) {
     };
     if app.is_editing() {
         // The search would begin with the state before the edit.
-        return app.state.toast(Tone::Warning, "Objects are being changed; segment the photo once that is done.");
+        return app.state.toast(Tone::Warning, "Objects are being changed; add from the photo once that is done.");
     }
     let scene = app.state.scene.clone();
     let Some(dataset) = scene.as_ref().and_then(|s| s.dataset.as_ref()) else {
@@ -146,7 +147,7 @@ pub(in crate::ui) fn segment_photo(app: &mut App) {
         scene.as_ref().map(|s| s.held_out(app.layout.config.holdout_every)).into_iter().flatten().collect();
     let Some(photo) = app.viewport.photo_index().or_else(|| view::nearest_photo(app, &held)) else { return };
     let seed = dataset.photos[photo].name.clone();
-    let step = FoundStep { what: format!("segmented {seed}"), adds: true };
+    let step = FoundStep { what: format!("added objects from {seed}"), adds: true };
     start_search(app, SearchScope { add: Some((known, seed)), ..SearchScope::default() }, Some(step));
 }
 
@@ -175,7 +176,7 @@ fn start_search(app: &mut App, scope: SearchScope, step: Option<FoundStep>) {
     let mut with = FindSettings { replace_all, vectors_first: true, ..app.layout.finding.clone() };
     with.seed = seed.or(with.seed);
     let title = match &known {
-        Some(_) => format!("Segmenting {}", with.seed.as_deref().unwrap_or("a photo")),
+        Some(_) => format!("Adding objects from {}", with.seed.as_deref().unwrap_or("a photo")),
         None => format!("Finding objects in {}", dataset.name),
     };
     if remote::refuses(app, &title, "run 'fmlgs preprocess' there") {
@@ -193,7 +194,8 @@ fn start_search(app: &mut App, scope: SearchScope, step: Option<FoundStep>) {
         side_px: app.state.plan.object_side_px,
         with,
     };
-    let (workspace, info) = (Arc::clone(&app.workspace), JobInfo::long(title).makes(Makes::Objects).pausable());
+    let info = JobInfo::long(title).makes(Makes::Objects).pausable().phases(phases::FINDING);
+    let workspace = Arc::clone(&app.workspace);
     let find = move |observer: &mut dyn Observer| workspace.find_objects(&request, observer);
     app.start_in_scene(info, find, move |app, found| {
         let Some(map) = found else { return };
@@ -254,24 +256,26 @@ pub(in crate::ui) fn submit_removal(app: &mut App, request: RemoveRequest) {
     if remote::refuses(app, "Removing", "run 'fmlgs remove' there") {
         return;
     }
+    let all = if request.retrain { phases::RETRAINING } else { phases::REMOVAL };
+    let info = JobInfo::long("Removing").pausable().phases(all);
     let remove = move |observer: &mut dyn Observer| removal::run_request(&request, observer);
-    app.start_in_scene(JobInfo::long("Removing").pausable(), remove, |app, removed| {
+    app.start_in_scene(info, remove, |app, removed| {
         let Some(removed) = removed else { return };
         app.state.toast(Tone::Good, removal::summary(&removed.name, &removed.report));
         app.state.say(Tone::Info, format!("Saved to {}", removed.folder.display()));
         super::open::compare_scene(app, Some(removed.folder.clone()));
+        // Both views show the place of what was removed.
+        let all = removed.request.options.ids.iter().filter_map(|id| app.viewport.bounds_of(*id, &app.state));
+        if let Some(bounds) = all.reduce(|a, b| Bounds { min: a.min.min(b.min), max: a.max.max(b.max) }) {
+            app.viewport.ask_for(bounds);
+        }
         app.state.removed = Some(removed);
     });
 }
 
-/// Asks for confirmation, and deletes the scene made by a removal.
+/// Asks for confirmation, and deletes the scene made by a removal, while it is shown beside the open one.
 pub(in crate::ui) fn ask_to_delete_removed(app: &mut App) {
-    let Some(removed) = &app.state.removed else {
-        return app.state.toast(
-            Tone::Warning,
-            "Only the scene that the latest removal made, while it is shown beside this one, is deleted here.",
-        );
-    };
+    let Some(removed) = &app.state.removed else { return super::runs::ask_to_delete_open(app) };
     let (name, folder) = (&removed.name, removed.folder.display());
     let text = format!(
         "Delete the copy without \u{201c}{name}\u{201d}? The original stays. This cannot be undone.\n\n{folder}"

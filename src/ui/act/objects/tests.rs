@@ -8,13 +8,13 @@ use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable;
 
 use super::*;
-use crate::jobs::find_objects::FindSettings;
+use crate::jobs::find_objects::{FindSettings, NO_ENCODER};
 use crate::jobs::models::{ModelList, ModelState};
 use crate::jobs::workspace::OpenedPath;
 use crate::jobs::{Folders, OpenedScene, Scene};
 use crate::models::catalog;
 use crate::navigate::testing::cloud_of_wall;
-use crate::pipeline::semantics::lifting::build_map::MaskPropagation;
+use crate::pipeline::semantics::lifting::build_map::{MaskPropagation, REGIONS};
 use crate::pipeline::semantics::query::recipe::QueryConfig;
 use crate::scene::{Dataset, Preparation, SemanticMap};
 use crate::ui::actions::Action;
@@ -155,6 +155,21 @@ fn what_has_arrived_of_a_download_is_said_and_need_not_come_again() {
     let harness = asked(Told::default());
     assert!(harness.query_by_label_contains("399 MB more, 200 MB are here already").is_some());
     assert!(harness.query_by_label_contains("Download 440 MB.").is_some(), "with MobileSAM's 41");
+}
+
+#[test]
+fn the_dialog_opens_with_the_models_of_the_last_search() {
+    let mut last = FindSettings::default();
+    let mut dialog = FindDialog::default();
+    dialog.open(&last);
+    let best = dialog.means(&list());
+    assert!(best.segmenter != REGIONS && best.encoder != NO_ENCODER, "{best:?}");
+    // The program was closed since, and a network is gone from the list.
+    (last.segmenter, last.encoder) = (Some(REGIONS.into()), Some("a network of before".into()));
+    let mut dialog = FindDialog::default();
+    dialog.open(&last);
+    let means = dialog.means(&list());
+    assert_eq!((means.segmenter.as_str(), means.encoder), (REGIONS, best.encoder));
 }
 
 #[test]

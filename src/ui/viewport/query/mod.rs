@@ -6,6 +6,7 @@
 mod asked;
 mod bar;
 mod card;
+mod carry_over;
 pub(crate) mod closed;
 pub(super) mod details;
 mod embeddings;

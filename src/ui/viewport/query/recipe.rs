@@ -15,7 +15,7 @@ pub(super) fn show(ui: &mut Ui, recipe: &mut QueryConfig) {
     ui.horizontal(|ui| {
         let name = recipe.name();
         for (other, text, hint) in [
-            (RecipeName::Default, "default", "This program's way: names first, embeddings where they know no more"),
+            (RecipeName::Default, "default", "Names first; embeddings where no name fits"),
             (RecipeName::Paper, "paper", "All of the paper's choices: by embedding, in two steps, never 'not found'"),
         ] {
             let label = ui.selectable_label(name == Some(other), text).on_hover_text(hint);

@@ -1,12 +1,12 @@
 //! The crop box in the view: its edges, faces that can be dragged, and a card with its corners as numbers.
 
-use egui::{
-    Align2, Area, Button, Color32, CursorIcon, DragValue, Grid, Id, Order, Pos2, Rect, Sense, Stroke, Ui, Vec2, vec2,
-};
+use egui::{Button, Color32, CursorIcon, DragValue, Grid, Id, Pos2, Rect, Sense, Stroke, Ui, Vec2, vec2};
 use glam::DVec3;
 
+use super::super::eye::is_in_view;
 use super::super::frusta::clipped;
 use super::super::split::ViewArea;
+use super::card::ToolCard;
 use super::{CardPlaces, ToolScene, ViewTool};
 use crate::math::format;
 use crate::scene::{Bounds, Camera, CropBox, GaussianCloud};
@@ -18,24 +18,43 @@ use crate::ui::{keys, theme};
 const HANDLE: f32 = 6.0;
 /// Steps across a scene while a number is dragged.
 const STEPS: f64 = 500.0;
+/// Factor and most steps by which an offered box is shrunk until it is in view.
+const SHRINK: f64 = 0.85;
+const MOST_SHRUNK: i32 = 30;
+/// Border of the picture in which an offered box has no corner, as a share of its size.
+const BORDER: f64 = 0.04;
 
 /// The crop box under edit. The box itself is part of what is visible, and outlives the tool.
-pub(crate) struct CropTool;
+pub(crate) struct CropTool {
+    /// The box that is drawn while there is none: it crops nothing until it is changed or accepted.
+    offered: CropBox,
+}
 
 impl CropTool {
-    /// A box around all Gaussians, with a margin: it crops nothing until it is changed.
-    pub(crate) fn first_box(cloud: Option<&GaussianCloud>, content: &Bounds) -> CropBox {
+    /// Offers a box that `eye` sees whole: around all Gaussians, with a margin, or else around `middle`.
+    pub(crate) fn new(cloud: Option<&GaussianCloud>, content: &Bounds, eye: &Camera, middle: DVec3) -> Self {
         let all = cloud.and_then(|cloud| Bounds::of((0..cloud.len()).map(|i| cloud.world_position(i))));
         let all = all.unwrap_or(*content);
         let (center, half) = (all.center(), 0.51 * all.size());
-        CropBox { bounds: Bounds { min: center - half, max: center + half }, outside: false }
+        let all = Bounds { min: center - half, max: center + half };
+        let middle = middle.clamp(content.min, content.max);
+        let shrunk = |step: i32| {
+            let share = SHRINK.powi(step);
+            Bounds { min: middle.lerp(content.min, share), max: middle.lerp(content.max, share) }
+        };
+        let bounds =
+            std::iter::once(all).chain((0..MOST_SHRUNK).map(shrunk)).find(|bounds| is_in_view(eye, bounds, BORDER));
+        Self { offered: CropBox { bounds: bounds.unwrap_or(*content), outside: false } }
     }
 }
 
 impl ViewTool for CropTool {
     /// Draws the box in the first view; its faces can be dragged.
     fn paint(&mut self, ui: &Ui, area: ViewArea, scene: &mut ToolScene<'_>, _cx: &mut Ctx<'_>) {
-        let Some(before) = scene.visibility.crop().filter(|_| !area.second) else { return };
+        if area.second {
+            return;
+        }
+        let before = scene.visibility.crop().unwrap_or(self.offered);
         let (mut crop, eye) = (before, scene.camera(area.shown));
         draw_edges(ui, area.shown, &eye, &crop.bounds);
         for axis in 0..3 {
@@ -55,13 +74,14 @@ impl ViewTool for CropTool {
         let before = scene.visibility.crop();
         let mut crop = before;
         let selected = scene.selected_bounds(state.semantics.as_ref());
-        let shown = places.first_frame;
-        // Above the facts about the frame.
-        let at = Align2::LEFT_BOTTOM.pos_in_rect(&shown.shrink(12.0)) - vec2(0.0, 40.0);
-        let area = Area::new(Id::unique("crop")).order(Order::Middle).pivot(Align2::LEFT_BOTTOM).fixed_pos(at);
-        theme::card(ui.ctx(), area.constrain_to(shown), |ui| {
-            if let Some(crop) = &mut crop {
-                numbers(ui, crop, 2.0 * content.radius() / STEPS);
+        ToolCard::in_corner("crop", "Crop box", places.first_frame).show(ui, |ui, _| {
+            if before.is_none() {
+                ui.weak("Nothing is cropped yet: drag a face, or type.");
+            }
+            let mut drawn = before.unwrap_or(self.offered);
+            numbers(ui, &mut drawn, 2.0 * content.radius() / STEPS);
+            if drawn != before.unwrap_or(self.offered) {
+                crop = Some(drawn);
             }
             ui.horizontal(|ui| {
                 let mut fit = |ui: &mut Ui, text: &str, tip: &str, to: Option<Bounds>| {
@@ -72,8 +92,10 @@ impl ViewTool for CropTool {
                 };
                 fit(ui, "Fit scene", "The box of the scene without its stray points.", Some(content));
                 fit(ui, "Fit selection", "The box of what is selected.", selected);
-                if ui.add_enabled(crop.is_some(), Button::new("Remove box")).on_hover_text("Show all again.").clicked()
-                {
+                if before.is_none() {
+                    let accept = ui.add(theme::primary_button("Crop")).on_hover_text("Show only what is in this box.");
+                    crop = if accept.clicked() { Some(self.offered) } else { crop };
+                } else if ui.button("Remove box").on_hover_text("Show all again.").clicked() {
                     crop = None;
                 }
             });
@@ -125,18 +147,13 @@ fn numbers(ui: &mut Ui, crop: &mut CropBox, step: f64) {
     ui.checkbox(&mut crop.outside, "Invert").on_hover_text("Show what is not in the box instead.");
 }
 
-fn corner(bounds: &Bounds, i: usize) -> DVec3 {
-    let Bounds { min, max } = bounds;
-    DVec3::from_array(std::array::from_fn(|axis| if i >> axis & 1 == 1 { max[axis] } else { min[axis] }))
-}
-
 /// Draws the twelve edges.
 fn draw_edges(ui: &Ui, shown: Rect, eye: &Camera, bounds: &Bounds) {
     let painter = ui.painter_at(shown);
-    let place = |p: glam::DVec2| shown.min + vec2(p.x as f32, p.y as f32);
+    let (corners, place) = (bounds.corners(), |p: glam::DVec2| shown.min + vec2(p.x as f32, p.y as f32));
     for axis in 0..3 {
         for i in (0..8).filter(|i| i >> axis & 1 == 0) {
-            let Some((a, b)) = clipped(eye, corner(bounds, i), corner(bounds, i | 1 << axis)) else { continue };
+            let Some((a, b)) = clipped(eye, corners[i], corners[i | 1 << axis]) else { continue };
             for stroke in [Stroke::new(3.0, Color32::from_black_alpha(110)), Stroke::new(1.3, theme::warning())] {
                 painter.line_segment([place(a), place(b)], stroke);
             }
@@ -187,7 +204,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_first_box_is_around_every_gaussian() {
+    fn the_first_box_is_in_view_and_around_every_gaussian_if_that_can_be() {
         let mut positions: Vec<[f32; 3]> = (0..100).map(|i| [i as f32 * 0.01; 3]).collect();
         positions.extend([[9.0, -9.0, 0.0], [f32::NAN; 3]]);
         let cloud = GaussianCloud { positions, ..GaussianCloud::default() };
@@ -196,11 +213,23 @@ mod tests {
             let p: DVec3 = cloud.world_position(i);
             p.cmpge(b.min).all() && p.cmple(b.max).all()
         };
-        let first = CropTool::first_box(Some(&cloud), &content).bounds;
-        assert!((0..101).all(|i| is_in(&first, i)), "{first:?}");
-        // Control: the box of the content leaves the stray one out; without Gaussians it is all that is known.
+        let from = |distance: f64| {
+            let middle = content.center();
+            let eye = middle + DVec3::new(0.6, -1.0, 0.5) * distance;
+            Camera::look_at(eye, middle, DVec3::Z, 0.8, 400, 300).expect("valid")
+        };
+        let offered = |cloud, eye: &Camera| CropTool::new(cloud, &content, eye, content.center()).offered.bounds;
+        let far = from(60.0);
+        let first = offered(Some(&cloud), &far);
+        assert!((0..101).all(|i| is_in(&first, i)) && is_in_view(&far, &first, BORDER), "{first:?}");
+        // From within the scene that box has no edge in view: a smaller one is offered, which has.
+        let near = from(0.7);
+        assert!(!is_in_view(&near, &first, BORDER) && !is_in_view(&near, &content, BORDER), "the control");
+        let first = offered(Some(&cloud), &near);
+        assert!(is_in_view(&near, &first, BORDER) && is_in(&first, 50) && !is_in(&first, 100), "{first:?}");
+        // The box of the content leaves the stray one out; without Gaussians it is all that is known.
         assert!(!is_in(&content, 100));
-        let without = CropTool::first_box(None, &content).bounds;
+        let without = offered(None, &far);
         assert!(!is_in(&without, 100) && is_in(&without, 50));
     }
 

@@ -1,13 +1,12 @@
 //! The inspector: the Gaussians that contribute to a pixel, with all properties of each.
 
-use egui::{
-    Align2, Area, Button, Color32, Grid, Id, Order, Rect, Response, RichText, ScrollArea, Sense, Stroke, Ui, vec2,
-};
+use egui::{Button, Color32, Grid, Rect, Response, RichText, ScrollArea, Sense, Stroke, Ui, vec2};
 use glam::{DQuat, DVec2, DVec3};
 use std::f64::consts::TAU;
 
 use super::super::frusta::clipped;
 use super::super::split::ViewArea;
+use super::card::ToolCard;
 use super::{CardPlaces, ToolScene, ViewTool};
 use crate::jobs::inspect::{self, GaussianRecord, InspectRequest, InspectedPixel, PixelRecord};
 use crate::math::format;
@@ -93,17 +92,10 @@ impl ViewTool for Inspector {
     /// Lists the properties of the Gaussian.
     fn card(&mut self, ui: &Ui, places: CardPlaces, _scene: &mut ToolScene<'_>, cx: &mut Ctx<'_>) {
         let shown = places.first_frame;
-        // Above the facts about the frame.
-        let at = Align2::LEFT_BOTTOM.pos_in_rect(&shown.shrink(12.0)) - vec2(0.0, 40.0);
-        let area = Area::new(Id::unique("inspector")).order(Order::Middle).pivot(Align2::LEFT_BOTTOM).fixed_pos(at);
-        let drawn = theme::card(ui.ctx(), area.constrain_to(shown), |ui| {
+        ToolCard::in_corner("inspector", "Inspect Gaussians", shown).show(ui, |ui, _| {
             ui.set_width((shown.width() - 44.0).clamp(120.0, 330.0));
-            card(ui, self, (shown.height() - 300.0).clamp(90.0, 420.0), cx);
+            card(ui, self, (shown.height() - 330.0).clamp(90.0, 420.0), cx);
         });
-        // The card has grown; the next frame places it correctly.
-        if drawn.response.rect.bottom() > at.y + 1.0 {
-            ui.ctx().request_repaint();
-        }
     }
 }
 
@@ -134,7 +126,7 @@ fn card(ui: &mut Ui, inspector: &mut Inspector, height: f32, cx: &mut Ctx<'_>) {
             });
         }
         (None, true) => {
-            ui.weak("Looking into the pixel\u{2026}");
+            ui.weak("Reading the pixel\u{2026}");
         }
         (None, false) => {
             ui.weak("No Gaussian is drawn there. Click a place in the view.");

@@ -5,7 +5,8 @@ use std::sync::Arc;
 use egui::{Color32, ColorImage, PointerButton, Rect, Response, Slider, TextureHandle, TextureOptions, Ui};
 
 use super::super::split::ViewArea;
-use super::{CardPlaces, ToolScene, ViewTool, bottom_card};
+use super::card::ToolCard;
+use super::{CardPlaces, ToolScene, ViewTool};
 use crate::math::grid::neighbors;
 use crate::scene::{Camera, Mask};
 use crate::ui::actions::Action;
@@ -162,8 +163,8 @@ impl ViewTool for MaskBrush {
 
     fn card(&mut self, ui: &Ui, places: CardPlaces, _scene: &mut ToolScene<'_>, cx: &mut Ctx<'_>) {
         let rect = places.active_view;
-        bottom_card(ui, "brush", rect, 200.0..=430.0, |ui| {
-            ui.label("Paint the true mask of this view: drag to paint, click to select what has the same color.");
+        ToolCard::at_bottom("brush", "Paint the true mask of this view", rect, 200.0..=430.0).show(ui, |ui, _| {
+            ui.label("Drag to paint, click to select what has the same color.");
             ui.weak("Shift erases. Right-drag and wheel move the view; the paint belongs to this one.");
             ui.horizontal(|ui| {
                 ui.add(Slider::new(&mut self.radius_px, 2.0..=60.0).show_value(false).text("brush"));

@@ -1,6 +1,7 @@
 //! The tools of the view, of which at most one is in use. A tool handles the pointer, draws over each view, has a card,
 //! and owns its jobs.
 
+mod card;
 pub(crate) mod crop;
 pub(crate) mod inspect;
 pub(crate) mod mask_brush;
@@ -9,9 +10,7 @@ pub(crate) mod ruler;
 pub(crate) mod select;
 pub(crate) mod transform;
 
-use std::ops::RangeInclusive;
-
-use egui::{Align2, Area, Id, Order, Rect, Response, Ui};
+use egui::{Rect, Response, Ui};
 
 use self::crop::CropTool;
 use self::inspect::Inspector;
@@ -32,7 +31,6 @@ use crate::scene::measurement::Measurement;
 use crate::scene::{Bounds, Camera, GaussianCloud, SemanticMap};
 use crate::ui::ctx::Ctx;
 use crate::ui::state::AppState;
-use crate::ui::theme;
 use crate::worker::{Tasks, Versioned};
 
 /// The tool in use.
@@ -101,16 +99,6 @@ pub(super) struct CardPlaces {
     pub(super) first_frame: Rect,
     /// The active view.
     pub(super) active_view: Rect,
-}
-
-/// Draws a card at the bottom of the view in `rect`, as wide as fits, within `width`.
-fn bottom_card(ui: &Ui, id: &str, rect: Rect, width: RangeInclusive<f32>, add: impl FnOnce(&mut Ui)) {
-    let at = Align2::CENTER_BOTTOM.pos_in_rect(&rect.shrink(52.0));
-    let area = Area::new(Id::unique(id)).order(Order::Foreground).pivot(Align2::CENTER_BOTTOM).fixed_pos(at);
-    theme::card(ui.ctx(), area.constrain_to(rect), |ui| {
-        ui.set_width((rect.width() - 40.0).clamp(*width.start(), *width.end()));
-        add(ui);
-    });
 }
 
 /// A tool of the view.

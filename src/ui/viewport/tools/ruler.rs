@@ -6,7 +6,8 @@ use glam::{DVec2, DVec3};
 
 use super::super::measured::DrawnMeasurement;
 use super::super::split::ViewArea;
-use super::{CardPlaces, ToolScene, ViewTool, bottom_card};
+use super::card::ToolCard;
+use super::{CardPlaces, ToolScene, ViewTool};
 use crate::math::format;
 use crate::math::geometry::GeometryFault;
 use crate::scene::measurement::{MeasuredValue, Measurement, MeasurementKind, free_name};
@@ -181,8 +182,11 @@ impl ViewTool for Ruler {
     fn card(&mut self, ui: &Ui, places: CardPlaces, scene: &mut ToolScene<'_>, cx: &mut Ctx<'_>) {
         let state = cx.state;
         // What grows is at the top, so that the rest stays under the pointer.
-        bottom_card(ui, "ruler", places.active_view, 260.0..=470.0, |ui| {
-            list(ui, scene.measurements, meters_per_unit(state), cx);
+        let card = ToolCard::at_bottom("ruler", "Measure", places.active_view, 260.0..=470.0).folding();
+        card.show(ui, |ui, is_folded| {
+            if !is_folded {
+                list(ui, scene.measurements, meters_per_unit(state), cx);
+            }
             self.kinds(ui, cx);
             let value = self.kind.value(&self.measured(scene, state.semantics.as_ref()));
             ui.horizontal_wrapped(|ui| {

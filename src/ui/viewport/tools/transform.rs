@@ -2,10 +2,11 @@
 
 use std::sync::Arc;
 
-use egui::{Align2, Area, Color32, DragValue, Id, Order, Rect, Sense, Stroke, Ui, Vec2, vec2};
+use egui::{Color32, DragValue, Id, Rect, Sense, Stroke, Ui, Vec2};
 use glam::{DQuat, DVec3};
 
 use super::super::split::ViewArea;
+use super::card::ToolCard;
 use super::crop::{on_screen, travel};
 use super::{CardPlaces, ToolScene, ViewTool};
 use crate::jobs::rearrange::{Arrangement, SplatEdit, apply};
@@ -104,20 +105,22 @@ impl TransformTool {
 
     /// Draws the card of the tool.
     fn show_card(&mut self, ui: &Ui, rect: Rect, all: &Identities, cx: &mut Ctx<'_>) {
-        // Above the facts about the frame.
-        let at = Align2::LEFT_BOTTOM.pos_in_rect(&rect.shrink(12.0)) - vec2(0.0, 40.0);
-        let area = Area::new(Id::unique("arranging")).order(Order::Foreground).pivot(Align2::LEFT_BOTTOM);
-        theme::card(ui.ctx(), area.fixed_pos(at).constrain_to(rect), |ui| {
-            ui.label(format!(
-                "Move \u{201c}{}\u{201d}: drag an arrow or type values",
-                all.full_name(self.arrangement.id)
-            ));
+        let name = all.full_name(self.arrangement.id);
+        let title = format!("Move \u{201c}{name}\u{201d}: drag an arrow or type values");
+        ToolCard::in_corner("arranging", title, rect).show(ui, |ui, _| {
+            // Fields are in meters where the scale is known, as lengths are elsewhere.
+            let meters = cx.state.scene.as_ref().and_then(|scene| scene.meters_per_unit());
+            let (scale, unit) = meters.map_or((1.0, "units"), |meters| (meters, "m"));
             ui.horizontal(|ui| {
                 ui.label("Move");
                 for (axis, name) in ["x", "y", "z"].into_iter().enumerate() {
-                    let field = DragValue::new(&mut self.arrangement.to.shift[axis]).speed(self.radius / 100.0);
-                    let field = ui.add(field.max_decimals(4).prefix(format!("{name} ")));
-                    field.accessible_name(format!("Move along {name}"));
+                    let shift = &mut self.arrangement.to.shift[axis];
+                    let mut shown = *shift * scale;
+                    let field = DragValue::new(&mut shown).speed(self.radius * scale / 100.0);
+                    let field = field.max_decimals(4).prefix(format!("{name} ")).suffix(format!(" {unit}"));
+                    if ui.add(field).accessible_name(format!("Move along {name}, {unit}")).changed() {
+                        *shift = shown / scale;
+                    }
                 }
             });
             ui.horizontal(|ui| {

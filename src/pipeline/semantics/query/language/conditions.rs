@@ -4,13 +4,24 @@ use std::collections::HashSet;
 use std::ops::Range;
 
 use super::evaluator::{Evaluator, Outcome};
-use super::expression::{Condition, Expression, OrderBy, Relation};
+use super::expression::{Condition, Expression, OrderBy, Relation, SetOf};
 use super::outcome::{Matches, Member, Unmet, Why};
 use super::relations::{HOLDS, Space, Way};
-use super::{adjectives, order};
+use super::{adjectives, nouns, order};
 use crate::math::format;
 use crate::scene::IdentityId;
+use crate::scene::colors::row;
 use crate::scene::identity::lexicon;
+
+/// Members of a set that colors are to describe: among things, also what others merely hold.
+fn with_contents(all: &mut Evaluator<'_>, of: &Expression, words: &[String]) -> Outcome {
+    let found = all.set(of)?;
+    if !matches!(of.set, SetOf::Any { parts: false, .. }) || !words.iter().any(|word| row(word).is_some()) {
+        return Ok(found);
+    }
+    let contents = nouns::contents(all);
+    Ok(Matches { members: found.members.into_iter().chain(contents).collect(), unclear: found.unclear })
+}
 
 /// Members of a set for which a condition holds, or does not.
 pub(super) fn filtered(
@@ -21,11 +32,21 @@ pub(super) fn filtered(
     at: &Range<usize>,
 ) -> Outcome {
     let anchors = anchors(all, is)?;
-    let found = all.set(of)?;
+    let found = match is {
+        Condition::Adjective(words) if !not => with_contents(all, of, words)?,
+        _ => all.set(of)?,
+    };
     let before = found.clone();
     let mut unclear = found.unclear;
     let kept = match is {
-        Condition::Adjective(words) => adjectives::described(all, found, words, not, at)?,
+        Condition::Adjective(words) => {
+            let mut kept = adjectives::described(all, found, words, not, at)?;
+            // A red bowl of apples is one red thing.
+            let ids = kept.ids();
+            let identities = all.scene.identities;
+            kept.members.retain(|m| !of.is_any() || !identities.ancestors(m.id).skip(1).any(|i| ids.contains(&i)));
+            kept
+        }
         Condition::Placed(relation, anchor) => {
             let space = all.space(at);
             let several = !anchor.is_plural() && anchors[0].len() > 1;

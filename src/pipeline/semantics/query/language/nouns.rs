@@ -16,6 +16,9 @@ use crate::scene::{IdentityId, Level};
 /// Sureness of what has the name only in part: a kind of it, or by embedding.
 const KIND: f64 = 0.95;
 
+/// Kinds of things that lie in others, or are worn by them: as parts they are things of their own.
+const CONTENTS: [&str; 3] = ["food", "clothing", "flower"];
+
 fn member(id: IdentityId) -> Member {
     Member { id, sure: 1.0, rank: 1 }
 }
@@ -61,6 +64,16 @@ pub(super) fn any(all: &mut Evaluator<'_>, parts: bool) -> Matches {
         }
     }
     Matches::new(found)
+}
+
+/// Parts that are things of their own, such as the apple of a fruit bowl.
+pub(super) fn contents(all: &Evaluator<'_>) -> Vec<Member> {
+    let identities = all.scene.identities;
+    let kinds = identities.words().kinds();
+    let of_kind = CONTENTS.iter().flat_map(|kind| kinds.of(kind)).map(|(id, ..)| id);
+    let is_part = |id: &IdentityId| identities.get(*id).is_some_and(|i| i.level == Level::Part);
+    let ids: BTreeSet<IdentityId> = of_kind.filter(|id| is_part(id) && all.accepts(*id)).collect();
+    ids.into_iter().map(member).collect()
 }
 
 /// Identities that "one" may stand for: the candidates of the last question, else all whose name ends in the same

@@ -1,9 +1,10 @@
 //! The card of the selection: shape, changes, and what becomes of it.
 
-use egui::{Button, ComboBox, Key, ProgressBar, Rect, Slider, TextEdit, Ui};
+use egui::{Button, ComboBox, Key, ProgressBar, Rect, Slider, TextEdit, Ui, vec2};
 use strum::VariantArray;
 
-use super::super::{ToolScene, bottom_card};
+use super::super::ToolScene;
+use super::super::card::ToolCard;
 use super::SelectTool;
 use crate::jobs::select::{SelectFor, SelectStep};
 use crate::math::format;
@@ -18,15 +19,20 @@ use crate::ui::{keys, theme};
 pub(super) fn show(tool: &mut SelectTool, ui: &Ui, rect: Rect, scene: &ToolScene<'_>, cx: &mut Ctx<'_>) {
     let (none, state) = (Identities::default(), cx.state);
     let all = state.semantics.as_ref().map_or(&none, |map| &map.identities);
-    bottom_card(ui, "selecting", rect, 220.0..=470.0, |ui| {
-        let what = match tool.purpose {
-            SelectFor::New(NO_IDENTITY) => "New object".to_owned(),
-            SelectFor::New(of) => format!("New part of {}", all.full_name(of)),
-            SelectFor::Extent(id) => format!("Correct {}", all.full_name(id)),
-        };
-        ui.label(format!("{what}: {}", tool.shape.hint()));
-        ui.weak("Shift removes. Backspace undoes. Right-drag and wheel move the view.");
+    let what = match tool.purpose {
+        SelectFor::New(NO_IDENTITY) => "New object".to_owned(),
+        SelectFor::New(of) => format!("New part of {}", all.full_name(of)),
+        SelectFor::Extent(id) => format!("Correct {}", all.full_name(id)),
+    };
+    let title = format!("{what}: {}", tool.shape.hint());
+    ToolCard::at_bottom("selecting", title, rect, 220.0..=470.0).folding().show(ui, |ui, is_folded| {
+        if !is_folded {
+            ui.weak("Shift removes. Backspace undoes. Right-drag and wheel move the view.");
+        }
         ui.horizontal_wrapped(|ui| {
+            if is_folded {
+                (ui.spacing_mut().item_spacing.x, ui.spacing_mut().button_padding) = (1.0, vec2(5.0, 2.0));
+            }
             for shape in SelectShape::VARIANTS {
                 let button = ui.selectable_label(tool.shape == *shape, sentence(<&str>::from(shape)));
                 if button.on_hover_text(sentence(shape.hint())).clicked() {
@@ -34,9 +40,13 @@ pub(super) fn show(tool: &mut SelectTool, ui: &Ui, rect: Rect, scene: &ToolScene
                 }
             }
         });
-        options(tool, ui);
-        changes(tool, ui, scene);
-        if let SelectFor::New(of) = tool.purpose {
+        if !is_folded {
+            options(tool, ui);
+            changes(tool, ui, scene);
+        }
+        if let SelectFor::New(of) = tool.purpose
+            && !is_folded
+        {
             ui.horizontal(|ui| {
                 ui.label("Keep as");
                 let name = TextEdit::singleline(&mut tool.name).hint_text("Name").char_limit(80);
@@ -149,7 +159,7 @@ fn status(tool: &SelectTool, ui: &mut Ui, scene: &ToolScene<'_>, cx: &Ctx<'_>) {
             String::new()
         }
         _ if !tool.is_prepared && tool.shape == SelectShape::Click => {
-            let text = "Preparing clicks, once for this scene";
+            let text = "Preparing selection, once for this scene";
             let bar = ProgressBar::new(scene.preparation.share(cx.state).unwrap_or(0.0)).desired_width(60.0);
             ui.add(bar.desired_height(6.0)).on_hover_text(text);
             "Preparing\u{2026}".to_owned()
