@@ -62,7 +62,7 @@ fn entries(file: &Path) -> Result<LinearLayer, IoError> {
 }
 
 fn codebook(run: &Path, splat: &Path) -> Option<PathBuf> {
-    let source = gs_output::beside(splat).and_then(|beside| beside.source);
+    let source = gs_output::beside(splat).and_then(|b| b.source).map(|s| s.found.unwrap_or(s.stated));
     // A relative path is relative to where the training was started, which is above the folder of the run.
     let below_run = source.as_deref().and_then(|s| s.strip_prefix(run).ok());
     let above = below_run.into_iter().flat_map(|s| run.ancestors().skip(1).take(ABOVE).map(move |above| above.join(s)));
