@@ -28,13 +28,15 @@ use crate::scene::{Identity, IdentityId, Lifting, MaskGrid, MaskPrompt, Preparat
 #[command(after_help = "Examples:\n  \
     fmlgs preprocess scene/ --masks photos/               masks that came with the photos\n  \
     fmlgs preprocess scene/ --masks labels/ --max-seeds 1  one labeled photo is enough to begin\n  \
+    fmlgs preprocess scene/ --masks language_features/     masks and vectors of LangSplat; no network\n  \
     fmlgs preprocess scene/ --segmenter regions           no masks: regions of the photos, unnamed and rough\n  \
     fmlgs preprocess scene/ --add DSC_12                  what this photo shows that is nobody's yet")]
 pub(crate) struct PreprocessArgs {
     /// Trained scene
     scene: PathBuf,
     /// Path of the masks: id maps of 'fmlgs synth', label files of ISAT (as in lerf_ovs), LabelMe, COCO or YOLO, the
-    /// folders of SPIn-NeRF, 3D-OVS, LERF-Mask or Ref-LERF, or masklets as in SA-V
+    /// folders of SPIn-NeRF, 3D-OVS, LERF-Mask or Ref-LERF, masklets as in SA-V, or LangSplat's language_features,
+    /// whose vectors become the embeddings
     #[arg(long)]
     masks: Option<PathBuf>,
     /// Source of the masks: 'files', 'regions' (built in, no weights: rough and unnamed), a model of
@@ -136,6 +138,7 @@ impl PreprocessArgs {
             max_seeds: self.max_seeds,
             unknown_share: self.unknown / 100.0,
             replace_all: self.replace_all,
+            vectors_first: false,
         }
     }
 }

@@ -57,7 +57,7 @@ pub enum IoError {
     #[error(
         "{path} holds no labels{passed}: looked for identities.json with id maps (fmlgs synth), images_<factor>/label/*.png \
          (SPIn-NeRF), segmentations/classes.txt (3D-OVS), test_mask/<view>/*.png (LERF-Mask), json/ with mask/ \
-         (Ref-LERF), and label files in it and the folders below: .json of ISAT (as in lerf_ovs), LabelMe, COCO \
+         (Ref-LERF), <photo>_s.npy with <photo>_f.npy (language_features of LangSplat), and label files in it and the folders below: .json of ISAT (as in lerf_ovs), LabelMe, COCO \
          (instances) or SA-V (masklets), .txt of YOLO (segments)"
     )]
     NoLabels { path: PathBuf, passed: String },

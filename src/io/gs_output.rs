@@ -1,5 +1,7 @@
 //! Files that 3D Gaussian Splatting's training leaves beside a splat: `cameras.json` with the photos' cameras,
 //! `cfg_args` with the photos' folder and the background.
+//!
+//! [`GsOutput`] holds the same for trainings of other programs.
 
 use std::path::{Path, PathBuf};
 
@@ -7,6 +9,7 @@ use glam::{DMat3, DVec2, DVec3};
 use serde::Deserialize;
 
 use super::photo_list::{some_of, straightened};
+use super::photo_source::PhotoSource;
 use super::trained::SceneCamera;
 use super::{IoError, files, labels};
 use crate::scene::Camera;
@@ -22,10 +25,21 @@ pub(crate) struct GsOutput {
     /// Folder of the training output.
     pub(crate) folder: PathBuf,
     pub(crate) cameras: Vec<SceneCamera>,
-    /// Folder of the photos at training time.
-    pub(crate) source: Option<PathBuf>,
+    /// Name of the scene, if the settings have one.
+    pub(crate) name: Option<String>,
+    /// Photos at training time.
+    pub(crate) source: Option<PhotoSource>,
     pub(crate) white_background: bool,
+    /// True if the Gaussians have Mip-Splatting's 3-D filter, which is in the `.ply` only.
+    pub(crate) filters: bool,
     pub(crate) warnings: Vec<String>,
+}
+
+impl GsOutput {
+    /// Makes the output of a training in this folder, of which nothing is known yet.
+    pub(crate) fn of(folder: &Path) -> Self {
+        Self { folder: folder.into(), ..Self::default() }
+    }
 }
 
 /// An entry of `cameras.json`.
@@ -57,6 +71,11 @@ pub(crate) fn latest(folder: &Path) -> Option<PathBuf> {
     Some(clouds.join(latest.1).join(CLOUD))
 }
 
+/// Returns whether a file is called like the settings or the cameras of such a training.
+pub(crate) fn is_settings(name: &str) -> bool {
+    name == SETTINGS || name == CAMERAS
+}
+
 /// Reads the training output beside `splat`, or above it if that is in `point_cloud/iteration_<n>`.
 pub(crate) fn beside(splat: &Path) -> Option<GsOutput> {
     let folder = files::folder_of(splat);
@@ -65,14 +84,17 @@ pub(crate) fn beside(splat: &Path) -> Option<GsOutput> {
     let above = whole.parent().filter(|p| is_called(&whole, "iteration_") && is_called(p, CLOUDS));
     let all = std::iter::once(folder).chain(above.and_then(Path::parent));
     let folder = all.into_iter().find(|f| f.join(CAMERAS).is_file() || f.join(SETTINGS).is_file())?;
-    let mut found = GsOutput { folder: folder.into(), ..GsOutput::default() };
+    let mut found = GsOutput::of(folder);
+    // Every splat of such a training is called like every other.
+    found.name = (Some(folder) == above.and_then(Path::parent)).then(|| files::folder_name(folder));
     let mut is_split = false;
     let settings = folder.join(SETTINGS);
     if let Some(text) = settings.is_file().then(|| files::read_text(&settings)) {
         match text {
             Ok(text) => {
                 let source = value(&text, "source_path").filter(|s| !s.is_empty());
-                found.source = source.map(|source| folder.join(source.replace('\0', "")));
+                found.source = source.map(|s| PhotoSource::find(Path::new(&s.replace('\0', "")), folder));
+                found.filters = value(&text, "kernel_size").is_some();
                 found.white_background = value(&text, "white_background") == Some("True");
                 is_split = value(&text, "eval") == Some("True");
             }
@@ -184,7 +206,8 @@ mod tests {
         // It looks along +y with +z up: columns right, down, forward.
         let camera = &found.cameras[0].camera;
         assert_eq!((camera.forward(), camera.center), (DVec3::Y, DVec3::new(1.0, 2.0, 3.0)));
-        assert_eq!(found.source, Some("/no/where".into()));
+        let source = found.source.expect("stated");
+        assert_eq!((source.stated, source.found), ("/no/where".into(), None));
         assert!(found.warnings[0].contains("1 cameras") && found.warnings[0].contains('d'), "{:?}", found.warnings);
         assert_eq!(beside(&folder.path().join("other/a.ply")), None, "not of that splat");
     }

@@ -10,7 +10,6 @@ use std::path::{Path, PathBuf};
 use crate::io::data_folder::data_folder;
 
 pub mod catalog;
-mod checkpoint;
 pub mod clip;
 mod demo;
 pub(crate) mod engine;

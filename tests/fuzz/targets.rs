@@ -174,6 +174,7 @@ pub fn all() -> Vec<Target> {
         Target::in_folder("label_masklets", Door::Json, "a.json", |_| {}, labels),
         Target::in_folder("label_ids", Door::Json, "identities.json", id_maps, labels),
         Target::in_folder("label_id_map", Door::Picture, "object_ids/photo.png", id_maps, labels),
+        Target::in_folder("label_levels", NPY, "photo_s.npy", |_| {}, labels),
         Target::in_folder("label_classes", Door::Any, "segmentations/classes.txt", classes, labels),
         Target::in_folder(
             "label_picture",

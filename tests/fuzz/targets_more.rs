@@ -53,6 +53,17 @@ pub fn all() -> Vec<Target> {
             "photo",
             "depth_map",
         ]),
+        Target::in_folder(
+            "torch",
+            Door::Starts(b"PK"),
+            "chkpnt7.pth",
+            |_| {},
+            |f| match io::open(&f.join("chkpnt7.pth")) {
+                Ok(io::Opened::Cloud(cloud)) => valid(Ok::<_, IoError>(cloud)).map_err(io::OpenError::from),
+                Ok(_) => unreachable!("a checkpoint is a cloud"),
+                Err(e) => Err(e),
+            },
+        ),
         Target::in_folder("semantic_map", Door::Any, io::semantic_map::FILE, |_| {}, map),
         Target::in_folder(
             "semantic_map_header",

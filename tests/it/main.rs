@@ -10,6 +10,7 @@ mod batch;
 mod cases;
 mod cli_basics;
 mod cli_depth;
+mod cli_language_features;
 mod cli_networks;
 mod cli_paths;
 mod cli_report;

@@ -9,6 +9,7 @@
 //! | `segmentations/classes.txt` | 3D-OVS ([`three_d_ovs`]) |
 //! | `test_mask/<view>/*.png` | LERF-Mask ([`lerf_mask`]) |
 //! | `json/`, `mask/`, `gt_mask/` | Ref-LERF ([`ref_lerf`]) |
+//! | `<photo>_s.npy`, `<photo>_f.npy`, or a folder `language_features` with them | LangSplat ([`language_features`]) |
 //! | files ([`files`](label_files)), also a single one, and in folders below | ISAT, as in lerf_ovs ([`isat`]); LabelMe; COCO; YOLO's segments; masklets of a video, as in SA-V ([`masklets`]) |
 //!
 //! Masks are drawn on the photos as stored, or on a larger or smaller copy of them; they are
@@ -20,8 +21,10 @@ pub(crate) mod isat;
 #[path = "files.rs"]
 pub(crate) mod label_files;
 mod labelme;
+pub(crate) mod language_features;
 pub(crate) mod lerf_mask;
 pub(crate) mod masklets;
+pub(crate) mod nested;
 pub(crate) mod pictures;
 mod polygons;
 pub(crate) mod ref_lerf;
@@ -38,6 +41,7 @@ use std::path::{Path, PathBuf};
 
 use self::belongs::{LabelAddress, PhotoNames, PicturesOf, bound};
 use self::label_files::LabelFile;
+use self::language_features::{MaskFolder, MaskVectors};
 pub(crate) use self::sheet::Sheet;
 use self::sheet::{AsLoaded, draw, read_ids};
 use super::IoError;
@@ -76,6 +80,8 @@ enum Source {
     Pictures(pictures::Pictures),
     /// Masklets of a video.
     Masklets(masklets::Masklets),
+    /// Arrays of masks and their vectors.
+    MaskFolder(MaskFolder),
     /// Label files of one picture or several.
     Files(Vec<LabelFile>),
 }
@@ -88,6 +94,10 @@ impl Labels {
             let ids = synth_ids::SynthIds::open(path)?;
             let addresses = ids.addresses();
             return with(Source::SynthIds(ids), addresses);
+        }
+        if let Some(folder) = language_features::find(path)? {
+            let addresses = folder.addresses();
+            return with(Source::MaskFolder(folder), addresses);
         }
         for find in [spin_nerf::find, three_d_ovs::find, lerf_mask::find, ref_lerf::find] {
             if let Some(pictures) = find(path)? {
@@ -108,6 +118,12 @@ impl Labels {
             }
             Some((_, masklets)) => (Source::Masklets(masklets), Vec::new()),
             None => {
+                for name in [language_features::FOLDER, language_features::COMPRESSED] {
+                    if let Some(folder) = language_features::find(&path.join(name))? {
+                        let addresses = folder.addresses();
+                        return Ok(Self { source: Source::MaskFolder(folder), addresses, of: None, notes });
+                    }
+                }
                 let passed = notes.iter().map(|note| format!(" ({note})")).collect();
                 return Err(IoError::NoLabels { path: path.into(), passed });
             }
@@ -177,15 +193,34 @@ impl Labels {
         }
         let mut all = Vec::new();
         for picture in self.pictures_of(photo) {
+            if let Source::MaskFolder(folder) = &self.source {
+                // A photo has one file; it is read as loaded.
+                return folder.regions(picture, sheet, &mut as_loaded);
+            }
             let regions = match &self.source {
                 Source::SynthIds(ids) => ids.regions(picture, sheet)?,
                 Source::Pictures(pictures) => pictures.regions(picture, sheet)?,
                 Source::Files(files) => files[picture].regions(sheet)?,
-                Source::Masklets(_) => Vec::new(),
+                Source::Masklets(_) | Source::MaskFolder(_) => Vec::new(),
             };
             things::join(&mut all, shown(regions, &mut as_loaded));
         }
         Ok(all)
+    }
+}
+
+impl Labels {
+    /// Returns the name of the encoder of the masks' vectors; `None` if the masks have none.
+    pub(crate) fn encoder(&self) -> Option<&'static str> {
+        matches!(&self.source, Source::MaskFolder(folder) if folder.has_vectors).then_some(language_features::ENCODER)
+    }
+
+    /// Reads the masks of a photo and their vectors, undistorted and scaled to at most `max_side_px`; `None` if it has
+    /// none.
+    pub(crate) fn vectors(&self, photo: &Photo, max_side_px: u32) -> Result<Option<MaskVectors>, IoError> {
+        let Source::MaskFolder(folder) = &self.source else { return Ok(None) };
+        let Some(&picture) = self.pictures_of(photo).first() else { return Ok(None) };
+        folder.vectors(picture, Sheet::new(photo), &mut AsLoaded::new(photo, max_side_px))
     }
 }
 

@@ -80,6 +80,24 @@ impl<'a> AsLoaded<'a> {
         let centers = self.centers.entry(drawn).or_insert_with(|| centers(&camera(), distortion, self.size));
         Mask::from_fn(width, height, |i| centers[i].is_some_and(|at| mask.contains(at)))
     }
+
+    /// Width and height of the photo as loaded, px.
+    pub(super) fn size(&self) -> [usize; 2] {
+        self.size
+    }
+
+    /// Resamples a number for each pixel of a copy of this width and height; `outside` where the lens shows nothing.
+    pub(super) fn numbers(&self, numbers: &[u16], drawn: [usize; 2], outside: u16) -> Vec<u16> {
+        let [width, height] = self.size;
+        if let Some(distortion) = &self.photo.distortion {
+            let camera = self.photo.camera.resized(drawn[0] as u32, drawn[1] as u32);
+            let number = |at: Option<usize>| at.map_or(outside, |at| numbers[at]);
+            return centers(&camera, distortion, self.size).into_iter().map(number).collect();
+        }
+        let nearest = |i: usize, axis: usize| (2 * i + 1) * drawn[axis] / (2 * self.size[axis]);
+        let row = |y: usize| (0..width).map(move |x| nearest(y, 1) * drawn[0] + nearest(x, 0));
+        (0..height).flat_map(row).map(|at| numbers[at]).collect()
+    }
 }
 
 /// Adds the pixels with centers in a polygon, where (0, 0) is the corner of the first pixel.

@@ -3,7 +3,7 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use crate::io::{IoError, colmap, files, llff, transforms};
+use crate::io::{IoError, files, posed, transforms};
 use crate::scene::Dataset;
 
 /// Reads the data set of the only `transforms*.json` in a folder without one of the usual name.
@@ -39,7 +39,7 @@ pub(super) fn of_photos(folder: &Path) -> Result<Option<Dataset>, String> {
     let mut above: Vec<PathBuf> = [&named, &real].into_iter().filter_map(|p| Some(p.parent()?.to_path_buf())).collect();
     above.dedup();
     for root in above {
-        let mut dataset = match read(&root) {
+        let mut dataset = match posed::read(&root) {
             None => continue,
             Some(Ok(dataset)) => dataset,
             Some(Err(e)) => {
@@ -55,15 +55,4 @@ pub(super) fn of_photos(folder: &Path) -> Result<Option<Dataset>, String> {
         }
     }
     broken.map_or(Ok(None), Err)
-}
-
-fn read(root: &Path) -> Option<Result<Dataset, IoError>> {
-    let list = root.join(transforms::USUAL);
-    Some(match () {
-        () if list.is_file() => transforms::read(&list),
-        () if root.join("transforms_train.json").is_file() => transforms::read_blender(root),
-        () if colmap::is_colmap(root) => colmap::read(root),
-        () if root.join(llff::POSES_FILE).is_file() => llff::read(root),
-        () => return None,
-    })
 }

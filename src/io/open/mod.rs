@@ -7,10 +7,12 @@ mod packed;
 use std::fs;
 use std::path::Path;
 
+use super::gs_output::GsOutput;
 use super::trained::{self, TrainedScene};
+use super::trainings::Training;
 use super::{
     IoError, OpenError, alpha, colmap, files, gs_output, khr_gltf, ksplat, llff, pixel_masks, sog, splat, splat_ply,
-    spz, transforms, unposed,
+    spz, trainings, transforms, unposed,
 };
 use crate::scene::{Axes, Dataset, GaussianCloud};
 
@@ -32,7 +34,7 @@ pub(crate) use among::data_set_around;
 type Result<T> = std::result::Result<T, OpenError>;
 
 /// Layouts of folders that are recognized, in this order, and the reader of each.
-const FOLDERS: [Layout; 7] = [
+const FOLDERS: [Layout; 8] = [
     Layout {
         name: "a trained scene (scene.json)",
         is_of_photos: false,
@@ -74,12 +76,22 @@ const FOLDERS: [Layout; 7] = [
         open: |p| Ok(Opened::Cloud(splat_ply::read(&gs_output::latest(p).unwrap_or_else(|| p.into()))?)),
     },
     Layout {
+        name: TRAINING,
+        is_of_photos: false,
+        is: trainings::is_training,
+        open: |p| Ok(Opened::Cloud(trainings::open(p)?.cloud)),
+    },
+    Layout {
         name: "a SOG splat (meta.json)",
         is_of_photos: false,
         is: |p| p.join(sog::META_FILE).is_file(),
         open: |p| Ok(Opened::Cloud(sog::read_folder(&p.join(sog::META_FILE))?)),
     },
 ];
+
+/// Layouts of trainings whose Gaussians are in checkpoints.
+const TRAINING: &str = "a training of 3D Gaussian Splatting (chkpnt<n>.pth), gsplat (ckpts/ckpt_<step>_rank<n>.pt) or \
+                        splatfacto (config.yml, nerfstudio_models/step-<n>.ckpt)";
 
 /// Returns whether a folder holds posed photos, and no trained scene.
 fn is_data_set(folder: &Path) -> bool {
@@ -96,7 +108,7 @@ struct Layout {
 }
 
 /// Files that are recognized, for the error.
-const FILES: &str = "splats (.ply, .compressed.ply, .splat, .ksplat, .spz, .sog, SOG's meta.json, .gltf or .glb with KHR_gaussian_splatting), transforms.json, scene.json, poses_bounds.npy";
+const FILES: &str = "splats (.ply, .compressed.ply, .splat, .ksplat, .spz, .sog, SOG's meta.json, .gltf or .glb with KHR_gaussian_splatting), checkpoints of Gaussians (.pth, .pt, .ckpt), transforms.json, scene.json, poses_bounds.npy";
 
 /// Bytes at the start of a file that tell formats apart.
 const MAGIC_BYTES: u64 = 4;
@@ -118,6 +130,29 @@ pub fn open_in(path: &Path, axes: Option<Axes>) -> Result<Opened> {
             Err(IoError::Unsupported { path, what, remedy: "photos and trained scenes say how they lie" }.into())
         }
     }
+}
+
+/// As [`open_in`], with the cameras and photos that belong to another program's training whose Gaussians are in
+/// checkpoints.
+///
+/// # Errors
+/// As [`open_in`].
+pub(crate) fn open_beside(path: &Path, axes: Option<Axes>) -> Result<(Opened, Option<GsOutput>)> {
+    let is_training = match path.is_dir() {
+        true => FOLDERS.iter().find(|l| (l.is)(path)).is_some_and(|l| l.name == TRAINING),
+        false => is_training_file(path),
+    };
+    if !is_training {
+        return Ok((open_in(path, axes)?, None));
+    }
+    let Training { cloud, beside } = trainings::open(path)?;
+    Ok((Opened::Cloud(turned(cloud, axes)), Some(beside)))
+}
+
+/// Returns whether a file is a checkpoint, or the settings of a training whose Gaussians are in checkpoints.
+fn is_training_file(path: &Path) -> bool {
+    let name = path.file_name().map_or_else(String::new, |n| n.to_string_lossy().to_lowercase());
+    path.is_file() && (trainings::is_checkpoint(&name) || trainings::is_settings(path))
 }
 
 fn open_any(path: &Path, axes: Option<Axes>) -> Result<Opened> {
@@ -191,6 +226,14 @@ fn open_file(path: &Path, axes: Option<Axes>) -> Result<Opened> {
             return Ok(Opened::Dataset(transforms::read(path)?));
         }
         _ => {}
+    }
+    if is_training_file(path) {
+        return Ok(Opened::Cloud(turned(trainings::open(path)?.cloud, axes)));
+    }
+    if gs_output::is_settings(&name)
+        && let Some(splat) = gs_output::latest(folder)
+    {
+        return Ok(Opened::Cloud(turned(splat_ply::read(&splat)?, axes)));
     }
     let start = files::read_start(path, MAGIC_BYTES)?;
     packed::refuse(path, &name, &start)?;

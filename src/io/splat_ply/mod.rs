@@ -11,6 +11,7 @@
 //! in double precision. Exports for other programs are relative to a nearby point, stated in a comment
 //! `fmlgs shift X Y Z`.
 
+mod filter;
 mod read;
 mod stream;
 mod write;
@@ -20,7 +21,7 @@ use std::path::Path;
 use crate::io::{IoError, files};
 use crate::scene::GaussianCloud;
 
-pub use read::parse;
+pub(crate) use read::FLAT;
 pub(crate) use stream::{state, state_in};
 pub use write::{check, encode, write};
 pub(crate) use write::{encode_near_zero, may_be_extra};
@@ -63,9 +64,14 @@ fn is_standard(name: &str) -> bool {
 /// Reads a splat `.ply`, plain or compressed (PlayCanvas's `.compressed.ply`).
 pub fn read(path: &Path) -> Result<GaussianCloud, IoError> {
     if let Some(cloud) = stream::read(path)? {
-        return Ok(cloud);
+        return Ok(filter::applied(cloud));
     }
     parse(&files::read(path, u64::MAX)?, path)
+}
+
+/// Parses the Gaussians of a splat `.ply`; `path` is for errors.
+pub fn parse(bytes: &[u8], path: &Path) -> Result<GaussianCloud, IoError> {
+    read::parse(bytes, path).map(filter::applied)
 }
 
 #[cfg(test)]

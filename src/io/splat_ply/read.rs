@@ -13,8 +13,8 @@ use crate::io::{IoError, compressed_ply, render_mode, shift, vertical};
 use crate::math::sh::coefficients;
 use crate::scene::{Bounds, ExtraProperty, GaussianCloud, SplatRenderMode};
 
-/// Parses the Gaussians of a splat `.ply`; `path` is for errors.
-pub fn parse(bytes: &[u8], path: &Path) -> Result<GaussianCloud, IoError> {
+/// Parses the Gaussians of a file as they are.
+pub(super) fn parse(bytes: &[u8], path: &Path) -> Result<GaussianCloud, IoError> {
     let ply = Ply::parse(bytes, path)?;
     if ply.element("chunk").is_some() {
         return compressed_ply::decode(&ply);
@@ -26,7 +26,7 @@ pub fn parse(bytes: &[u8], path: &Path) -> Result<GaussianCloud, IoError> {
 }
 
 /// Logarithm of the third standard deviation of 2D Gaussian Splatting's disks, which have none; as in other viewers.
-const FLAT: f32 = -13.815_511;
+pub(crate) const FLAT: f32 = -13.815_511;
 
 pub(super) struct Reading<'a> {
     pub(crate) ply: &'a Ply<'a>,

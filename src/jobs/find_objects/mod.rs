@@ -57,6 +57,9 @@ pub struct FindSettings {
     /// True if objects and parts that the user has edited are found anew, too; else they are kept.
     #[serde(skip)]
     pub replace_all: bool,
+    /// True if vectors that came with the masks go before `encoder`.
+    #[serde(skip)]
+    pub vectors_first: bool,
 }
 
 impl Default for FindSettings {
@@ -73,6 +76,7 @@ impl Default for FindSettings {
             max_seeds,
             unknown_share: reseed_share,
             replace_all: false,
+            vectors_first: false,
         }
     }
 }
@@ -188,6 +192,7 @@ pub(crate) fn run(
         code_steps: with.code_steps,
         part_weight: preparation.part_weight,
         grid: None,
+        encoder_of_masks: None,
         keep: keep.map(Arc::new),
     };
     let labels = masks.map(|path| Labels::of_photos(path, &dataset.photos)).transpose()?;
@@ -221,12 +226,20 @@ pub(crate) fn run(
     let options = FindOptions { grid: network.as_ref().map(|(_, grid)| *grid), ..options };
     let network = network.as_ref().map(|(name, grid)| (name.as_str(), *grid));
     let by_files = labels.as_ref().map(|_| "files");
+    let of_masks = labels.as_ref().and_then(Labels::encoder);
     let mut segmenter = segmenter(labels, cloud, settings, network, folder.join("cache"))?;
     // Additions use the encoder of the rest.
     let looked = |map: &Arc<SemanticMap>| map.language.as_ref().map_or(NO_ENCODER.to_owned(), |l| l.encoder.clone());
     let encoder = request.known.as_ref().map(looked).or_else(|| with.encoder.clone());
+    // Vectors that came with the masks need no network, unless an encoder is asked for.
+    let of_masks = of_masks.filter(|own| match &request.known {
+        Some(_) => encoder.as_deref() == Some(*own),
+        None => encoder.is_none() || with.vectors_first,
+    });
+    let options = FindOptions { encoder_of_masks: of_masks, ..options };
     let mut encoder = match encoder.as_deref() {
         Some(NO_ENCODER) => None,
+        _ if of_masks.is_some() => None,
         Some(name) => Some(models::encoder(name)?),
         // Without an encoder, names alone are understood.
         None => models::best_encoder(&mut warn)
@@ -234,7 +247,9 @@ pub(crate) fn run(
             .ok(),
     };
     let by = network.map(|(name, _)| name).or(by_files).unwrap_or(REGIONS);
-    observer.note(Severity::Info, summary(with, preparation, by, encoder.as_ref().map(|e| e.name())));
+    let looks = encoder.as_ref().map(|e| e.name().to_owned());
+    let looks = looks.or_else(|| of_masks.map(|name| format!("the vectors of the masks ({name})")));
+    observer.note(Severity::Info, summary(with, preparation, by, looks.as_deref()));
     if let Some(look) = network.and_then(|(name, _)| InferenceEstimate::of_installed(name)) {
         let most = photos.len().min(options.track.max_seeds);
         observer.note(Severity::Info, forecast::sentence(look, most));

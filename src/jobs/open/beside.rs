@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 
 use super::{OpenedScene, Scene};
 use crate::io::gs_output::{self, GsOutput};
+use crate::io::photo_source::PhotoSource;
 use crate::io::scene_files::{SELECTION_FILE, is_scene};
 use crate::io::trained::SceneCamera;
 use crate::scene::{Dataset, Photo};
@@ -29,17 +30,17 @@ pub(super) fn splat_of(path: &Path) -> PathBuf {
     latest.filter(|_| !is_dataset()).unwrap_or_else(|| path.into())
 }
 
-/// Adds the files beside the scene's file.
-pub(super) fn add_to(scene: &mut Scene) {
-    let Some(GsOutput { folder, cameras, source, white_background, warnings }) = gs_output::beside(&scene.path) else {
-        return;
-    };
-    scene.dataset_path = source.clone().filter(|source| source.is_dir());
+/// Adds what belongs to the scene's file: as its training is known, or else from the files beside it.
+pub(super) fn add_to(scene: &mut Scene, training: Option<GsOutput>) {
+    let Some(found) = training.or_else(|| gs_output::beside(&scene.path)) else { return };
+    let GsOutput { folder, cameras, name, source, white_background, warnings, .. } = found;
     scene.warnings.extend(warnings);
-    if let Some(gone) = source.as_ref().filter(|_| scene.dataset_path.is_none()) {
-        scene.warnings.push(format!("its photos were in {}, which is not here", gone.display()));
+    scene.warnings.extend(source.as_ref().and_then(PhotoSource::warning));
+    scene.dataset_path = source.as_ref().and_then(|source| source.found.clone());
+    scene.photos = source.map(|source| source.stated);
+    if let Some(name) = name {
+        scene.name = name;
     }
-    scene.photos = source;
     scene.cameras = cameras;
     scene.cameras_from = Some(folder);
     if white_background {

@@ -8,6 +8,7 @@ use super::held_out::held_out;
 use super::runs::{self, RunSummary};
 use super::sparse_cloud::sparse_cloud;
 use super::{Folders, JobError, measurements, plan};
+use crate::io::gs_output::GsOutput;
 use crate::io::labels::Labels;
 use crate::io::scene_files::CHECKPOINT_FILE;
 use crate::io::trained::{self, History, SceneCamera};
@@ -108,14 +109,14 @@ impl Scene {
         known.ok_or_else(|| JobError::PhotosGone(self.path.clone()))
     }
 
-    fn bare(path: &Path, mut cloud: GaussianCloud) -> Self {
+    fn bare(path: &Path, mut cloud: GaussianCloud, training: Option<GsOutput>) -> Self {
         let name = path.file_stem().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
         let warnings = std::mem::take(&mut cloud.warnings);
         let near = near_without_cameras(&cloud);
         let settings = RenderSettings { near, ..RenderSettings::of_mode(cloud.render_mode) };
         let (cloud, sh_stored) = compact(cloud);
         let mut scene = Self { path: path.into(), name, cloud, sh_stored, settings, warnings, ..Self::default() };
-        beside::add_to(&mut scene);
+        beside::add_to(&mut scene, training);
         scene
     }
 
@@ -166,9 +167,10 @@ pub(crate) enum Contents {
 /// Reads the contents of `path`; a splat with these axes, if given.
 pub(crate) fn contents(path: &Path, axes: Option<Axes>) -> Result<Contents, JobError> {
     let path = &*beside::splat_of(path);
-    Ok(match io::open_in(path, axes)? {
+    let (opened, training) = io::open_beside(path, axes)?;
+    Ok(match opened {
         Opened::Dataset(dataset) => Contents::Photos(dataset),
-        Opened::Cloud(cloud) => Contents::Scene(Scene::bare(path, cloud)),
+        Opened::Cloud(cloud) => Contents::Scene(Scene::bare(path, cloud, training)),
         Opened::Trained(scene) => {
             let config = TrainConfig::stored(&scene.folder, scene.info.config.clone())?;
             Contents::Scene(Scene::trained(path, scene, config))
@@ -308,10 +310,11 @@ pub(crate) fn open(
 ) -> Result<OpenedScene, JobError> {
     let path = &beside::splat_of(&std::path::absolute(path).unwrap_or_else(|_| path.to_path_buf()));
     let mut at = path.clone();
-    let mut opened = match io::open(path)? {
+    let (found, training) = io::open_beside(path, None)?;
+    let mut opened = match found {
         Opened::Dataset(dataset) => photos(named(dataset, folders), folders, observer),
         Opened::Cloud(cloud) => {
-            let scene = Scene::bare(path, cloud);
+            let scene = Scene::bare(path, cloud, training);
             let seen = scene.dataset_path.is_some().then(|| photos_of(&scene, observer)).flatten();
             let dataset = seen.or_else(|| beside::photos_unseen(&scene)).map(Arc::new);
             OpenedScene::of(scene, dataset, observer)

@@ -22,10 +22,10 @@ use sha2::Digest;
 use zip::ZipArchive;
 
 use super::ModelError;
-use super::checkpoint::{WeightFile, WeightFileError};
 use crate::io::error::write_error;
 use crate::io::files::{Summed, hex};
 use crate::io::temporary::temporary_folder;
+use crate::io::torch::{WeightFile, WeightFileError};
 
 /// Prefixes that the tensors of a checkpoint may have.
 const ROOTS: [&str; 4] = ["", "model.", "state_dict.", "module."];
@@ -81,7 +81,7 @@ impl<'a> Template<'a> {
         progress: &mut dyn FnMut(u64, u64) -> bool,
     ) -> Result<(), ModelError> {
         let refused = |e: WeightFileError| ModelError::Metadata { path: checkpoint.into(), problem: e.to_string() };
-        let mut weights = WeightFile::open(checkpoint)?;
+        let mut weights = WeightFile::open(checkpoint).map_err(refused)?;
         let root = self.root(&weights);
         self.check(&weights, root).map_err(refused)?;
         std::fs::create_dir_all(folder).map_err(|e| failed(folder, e))?;

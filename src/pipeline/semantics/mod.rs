@@ -9,12 +9,14 @@
 //!
 //! A room uses the rooms before it, never one after it. The modules beside the rooms use no room: [`view_map`] and
 //! [`code_map`] render the identities of a known map and their codes into a view, [`thumbnails`] renders each identity
-//! alone, and [`relevancy`] compares embeddings, of phrases and of parts with their wholes.
+//! alone, [`relevancy`] compares embeddings, of phrases and of parts with their wholes, and [`smoothing`] makes masks
+//! of relevancy as LangSplat does.
 
 pub mod code_map;
 pub(crate) mod evaluation;
 pub mod lifting;
 pub mod query;
 pub mod relevancy;
+pub(crate) mod smoothing;
 pub(crate) mod thumbnails;
 pub mod view_map;

@@ -64,7 +64,7 @@ macro_rules! action_table {
                 "Find objects that this photo, or else the nearest one, shows and that are not known yet. Objects and parts stay; can be undone."
                 => objects::segment_photo(app);
             ChooseMasks: "Find objects with other masks\u{2026}",
-                "Labels of ISAT, LabelMe, COCO, YOLO, fmlgs synth, SPIn-NeRF, 3D-OVS, LERF-Mask or Ref-LERF; one labeled photo is enough."
+                "Labels of ISAT, LabelMe, COCO, YOLO, fmlgs synth, SPIn-NeRF, 3D-OVS, LERF-Mask or Ref-LERF, or LangSplat's language_features; one labeled photo is enough."
                 => objects::choose_masks(app);
             FetchModel(id: String): format!("Download the model {id}"), "Download it, verify it, and use it from then on."
                 => objects::install_model(app, id, None);

@@ -8,6 +8,7 @@ use super::*;
 use crate::scene::Camera;
 
 mod isat_files;
+mod language_features;
 mod other_programs;
 
 fn photo(name: &str, w: u32, h: u32) -> Photo {

@@ -6,15 +6,9 @@
 
 use super::{AskedScene, LabeledView, Unit};
 use crate::pipeline::semantics::query::answer::QueryAnswer;
+use crate::pipeline::semantics::smoothing::{cut, largest, smoothed};
 use crate::pipeline::semantics::view_map::ViewMap;
 use crate::scene::{Identities, IdentityId, Level, Mask};
-
-/// Side of the box filter, px.
-const BOX: usize = 30;
-/// Half the side of the majority filter, px.
-const MAJORITY: usize = 3;
-/// Cut of the normalized relevancy.
-const CUT: f32 = 0.4;
 
 pub(crate) fn compare(scene: &mut AskedScene<'_>, view: &LabeledView<'_>) -> Vec<Unit> {
     let (w, h) = (view.exact.width_px, view.exact.height_px);
@@ -36,11 +30,8 @@ fn answer(answered: &QueryAnswer, map: &ViewMap, identities: &Identities) -> (Ma
     let (w, h) = (map.width_px, map.height_px);
     let levels = [Level::Object, Level::Part].map(|level| {
         let relevancy: Vec<f32> = map.identity.iter().map(|id| at_level(answered, identities, *id, level)).collect();
-        let avg = box_filter(&relevancy, w, h);
-        let v: Vec<f32> = avg.iter().zip(&relevancy).map(|(a, r)| 0.5 * (a + r)).collect();
-        (avg, v)
+        smoothed(&relevancy, w, h)
     });
-    let largest = |v: &[f32]| v.iter().copied().fold(f32::NEG_INFINITY, f32::max);
     let by_v = usize::from(largest(&levels[1].1) > largest(&levels[0].1));
     let by_avg = usize::from(largest(&levels[1].0) > largest(&levels[0].0));
     let avg = &levels[by_avg].0;
@@ -58,55 +49,6 @@ fn at_level(answered: &QueryAnswer, identities: &Identities, id: IdentityId, lev
     answered.relevancy.get(of as usize).copied().unwrap_or(0.0)
 }
 
-fn cut(v: &[f32], w: usize, h: usize) -> Mask {
-    let (least, most) = v.iter().fold((f32::INFINITY, f32::NEG_INFINITY), |(l, m), x| (l.min(*x), m.max(*x)));
-    if most.is_nan() || most <= least {
-        return Mask::empty(w, h);
-    }
-    let kept = Mask::from_fn(w, h, |i| (2.0 * (v[i] - least) / (most - least) - 1.0).clamp(0.0, 1.0) > CUT);
-    majority(&kept)
-}
-
-/// Mean over a window of [`BOX`] x [`BOX`], edges mirrored without repeating the outermost pixel.
-fn box_filter(v: &[f32], w: usize, h: usize) -> Vec<f32> {
-    let mirror = |i: isize, n: usize| -> usize {
-        let period = (2 * n as isize - 2).max(1);
-        let i = i.rem_euclid(period);
-        i.min(period - i).clamp(0, n as isize - 1) as usize
-    };
-    let pass = |v: &[f64], w: usize, h: usize| -> Vec<f64> {
-        // Along rows, written transposed.
-        let mut out = vec![0.0; w * h];
-        let half = (BOX / 2) as isize;
-        for y in 0..h {
-            let row = &v[y * w..(y + 1) * w];
-            let mut sum: f64 = (-half..half).map(|k| row[mirror(k, w)]).sum();
-            for x in 0..w as isize {
-                out[x as usize * h + y] = sum / BOX as f64;
-                sum += row[mirror(x + half, w)] - row[mirror(x - half, w)];
-            }
-        }
-        out
-    };
-    let wide: Vec<f64> = v.iter().map(|x| f64::from(*x)).collect();
-    pass(&pass(&wide, w, h), h, w).into_iter().map(|x| x as f32).collect()
-}
-
-/// Pixels most of whose neighborhood is in the mask.
-fn majority(mask: &Mask) -> Mask {
-    let (w, h) = (mask.width_px(), mask.height_px());
-    Mask::from_fn(w, h, |i| {
-        let (x, y) = (i % w, i / w);
-        let (xs, ys) = (
-            x.saturating_sub(MAJORITY)..(x + MAJORITY + 1).min(w),
-            y.saturating_sub(MAJORITY)..(y + MAJORITY + 1).min(h),
-        );
-        let all = xs.len() * ys.len();
-        let inside: usize = ys.map(|y| xs.clone().filter(|x| mask.contains(y * w + x)).count()).sum();
-        2 * inside > all
-    })
-}
-
 #[cfg(test)]
 mod tests {
     use super::super::Category;
@@ -117,27 +59,6 @@ mod tests {
     use crate::pipeline::semantics::query::recipe::QueryConfig;
     use crate::scene::{Camera, NO_IDENTITY, SemanticMap};
     use glam::DVec3;
-
-    #[test]
-    fn the_box_filter_is_a_mean_with_mirrored_edges() {
-        let (w, h) = (41, 33);
-        let v: Vec<f32> = (0..w * h).map(|i| ((i * 37) % 101) as f32).collect();
-        let got = box_filter(&v, w, h);
-        let mirror = |i: i64, n: usize| {
-            let i = i.abs();
-            if i >= n as i64 { 2 * n as i64 - 2 - i } else { i }
-        };
-        for (x, y) in [(0, 0), (20, 16), (40, 32), (3, 30)] {
-            let mut sum = 0.0;
-            for dy in -15..15_i64 {
-                for dx in -15..15_i64 {
-                    sum += v[(mirror(y + dy, h) * w as i64 + mirror(x + dx, w)) as usize];
-                }
-            }
-            let at = got[y as usize * w + x as usize];
-            assert!((at - sum / 900.0).abs() < 1e-3, "{x} {y}: {at} {}", sum / 900.0);
-        }
-    }
 
     #[test]
     fn the_most_relevant_identity_is_cut_out() {

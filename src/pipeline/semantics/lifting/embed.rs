@@ -23,7 +23,7 @@ const COUNT_SIDE_PX: u32 = 256;
 /// Tiles between two checks for cancellation.
 const TILES_AT_ONCE: usize = 8;
 /// Least number of pixels in such a view for an identity to be embedded.
-const LEAST_PX: usize = 12;
+pub(super) const LEAST_PX: usize = 12;
 
 /// Embeds every identity of `map` that `encoder` has not embedded yet, in up to [`MAX_VIEWS`] of the `photos`. Parts
 /// keep `part_weight` of their own embedding.
@@ -100,15 +100,15 @@ pub(crate) fn embed(
     Ok(LanguageFeatures { encoder: name, dimension, by_identity: of })
 }
 
-struct CropRenderer<'a> {
-    cloud: &'a GaussianCloud,
-    map: &'a SemanticMap,
-    settings: &'a RenderSettings,
-    renderer: Renderer,
+pub(super) struct CropRenderer<'a> {
+    pub(super) cloud: &'a GaussianCloud,
+    pub(super) map: &'a SemanticMap,
+    pub(super) settings: &'a RenderSettings,
+    pub(super) renderer: Renderer,
 }
 
 impl CropRenderer<'_> {
-    fn draw(&mut self, photo: &Photo, max_side_px: u32) -> Result<ViewMap, FindError> {
+    pub(super) fn draw(&mut self, photo: &Photo, max_side_px: u32) -> Result<ViewMap, FindError> {
         let camera = photo.camera.limited_to(max_side_px);
         let Self { cloud, map, settings, renderer } = self;
         ViewMap::render(renderer, cloud, &map.identity_of, &map.identities, &camera, settings)

@@ -10,7 +10,7 @@
 //!    belong to.
 //! 4. [`codes`] give every identity its point in code space; [`train_codes`] trains the codes of Gaussians instead, as
 //!    in the paper.
-//! 5. [`embed`] gives every identity its embedding.
+//! 5. [`embed`] gives every identity its embedding; [`mask_vectors`] takes it from vectors that came with the masks.
 //!
 //! A known map changes by [`edit`] and [`add_photo`]. [`keep`] holds edited objects in a new search, and [`carry`]
 //! takes the map to other Gaussians of the scene.
@@ -28,6 +28,7 @@ mod floaters;
 pub mod frame_cache;
 pub(crate) mod keep;
 pub(crate) mod mask_cache;
+mod mask_vectors;
 mod nearest;
 pub(crate) mod network_segmenter;
 mod prompt_points;

@@ -2,6 +2,7 @@
 
 use super::error::FindError;
 use super::filters::Kept;
+use crate::io::labels::language_features::MaskVectors;
 use crate::io::labels::{Labels, Region};
 use crate::pipeline::observer::{Observer, Ticker};
 use crate::scene::{Level, Mask, Photo};
@@ -49,6 +50,15 @@ pub trait Segmenter {
     /// If they cannot be read.
     fn names(&self, _: &Photo) -> Result<Vec<String>, FindError> {
         Ok(Vec::new())
+    }
+
+    /// Returns the masks of a photo with the vectors that came with them, undistorted and scaled to at most
+    /// `max_side_px`; `None` if there are none.
+    ///
+    /// # Errors
+    /// If they cannot be read.
+    fn vectors(&self, _: &Photo, _max_side_px: u32) -> Result<Option<MaskVectors>, FindError> {
+        Ok(None)
     }
 
     /// Returns the masks of a photo, undistorted and scaled to at most `max_side_px`, wholes before pieces. Empty if
@@ -109,6 +119,10 @@ impl Segmenter for FileMasks {
 
     fn names(&self, photo: &Photo) -> Result<Vec<String>, FindError> {
         Ok(self.0.names(photo)?)
+    }
+
+    fn vectors(&self, photo: &Photo, max_side_px: u32) -> Result<Option<MaskVectors>, FindError> {
+        Ok(self.0.vectors(photo, max_side_px)?)
     }
 
     fn segment(&mut self, photo: &Photo, max_side_px: u32, _: &mut dyn Observer) -> Result<Vec<FoundMask>, FindError> {

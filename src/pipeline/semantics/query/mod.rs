@@ -8,12 +8,15 @@
 //! 4. [`answer`] puts it together, with the time of each of the [`timing`] stages.
 //! 5. [`matching`] finds the pixels and the Gaussians of the answer.
 //!
+//! [`foreign`] answers from the results of other methods instead of a `SemanticMap`.
+//!
 //! The [`lexicon`](crate::scene::identity::lexicon) knows words that no name has. All choices are settings of one
 //! [`recipe`].
 
 pub mod answer;
 pub mod by_embedding;
 pub(crate) mod colors;
+pub mod foreign;
 pub(crate) mod grounds;
 pub(crate) mod language;
 pub mod localize;

@@ -173,7 +173,7 @@ fn start_search(app: &mut App, scope: SearchScope, step: Option<FoundStep>) {
         return app.state.toast(Tone::Warning, "Train first: objects are found among trained Gaussians.");
     };
     let (known, seed) = add.unzip();
-    let mut with = FindSettings { replace_all, ..app.layout.finding.clone() };
+    let mut with = FindSettings { replace_all, vectors_first: true, ..app.layout.finding.clone() };
     with.seed = seed.or(with.seed);
     let title = match &known {
         Some(_) => format!("Adding objects from {}", with.seed.as_deref().unwrap_or("a photo")),

@@ -11,6 +11,7 @@ use super::codes;
 use super::embed::embed;
 use super::error::FindError;
 use super::keep;
+use super::mask_vectors::embed_by_masks;
 use super::network_segmenter::NetworkMasks;
 use super::regions::Regions;
 use super::sam2_tracker::Sam2Tracker;
@@ -54,6 +55,8 @@ pub(crate) struct FindOptions {
     pub(crate) part_weight: f32,
     /// Grid of prompt points, if a network finds the masks.
     pub(crate) grid: Option<MaskGrid>,
+    /// Encoder of the vectors that came with the masks, if identities are embedded by these.
+    pub(crate) encoder_of_masks: Option<&'static str>,
     /// Objects and parts edited by the user, which are kept beside the new ones.
     pub(crate) keep: Option<Arc<SemanticMap>>,
 }
@@ -66,6 +69,7 @@ impl Default for FindOptions {
             code_steps: CODE_STEPS,
             part_weight: PART_WEIGHT,
             grid: None,
+            encoder_of_masks: None,
             keep: None,
         }
     }
@@ -127,9 +131,7 @@ pub(crate) fn find_objects(
         let mut map = joined(known, &tracked, photos);
         observer.note(Severity::Info, summary(known, &map));
         let start = Instant::now();
-        if let Some(encoder) = encoder {
-            map.language = Some(embed(cloud, &map, photos, settings, options.part_weight, encoder, observer)?);
-        }
+        embedded(&mut map, cloud, photos, settings, (segmenter, encoder), options, observer)?;
         map.look_at(cloud);
         let Tracked { views, mut secs, .. } = tracked;
         secs.push(("look at identities", start.elapsed().as_secs_f64()));
@@ -157,13 +159,32 @@ pub(crate) fn find_objects(
     if let Some(kept) = &options.keep {
         map = keep::joined(&map, kept);
     }
-    if let Some(encoder) = encoder {
-        let start = Instant::now();
-        map.language = Some(embed(cloud, &map, photos, settings, options.part_weight, encoder, observer)?);
+    let start = Instant::now();
+    if embedded(&mut map, cloud, photos, settings, (segmenter, encoder), options, observer)? {
         timed("look at identities", start);
     }
     map.look_at(cloud);
     Ok(Found { map, views, secs })
+}
+
+/// Embeds the identities, by an encoder or by the vectors of the masks; returns whether there is either.
+fn embedded(
+    map: &mut SemanticMap,
+    cloud: &GaussianCloud,
+    photos: &[Photo],
+    settings: &RenderSettings,
+    (segmenter, encoder): (&dyn Segmenter, Option<&mut (dyn Encoder + 'static)>),
+    options: &FindOptions,
+    observer: &mut dyn Observer,
+) -> Result<bool, FindError> {
+    let part_weight = options.part_weight;
+    let language = match (encoder, options.encoder_of_masks) {
+        (Some(encoder), _) => embed(cloud, map, photos, settings, part_weight, encoder, observer)?,
+        (None, Some(name)) => embed_by_masks(cloud, map, photos, settings, part_weight, (name, segmenter), observer)?,
+        (None, None) => return Ok(false),
+    };
+    map.language = Some(language);
+    Ok(true)
 }
 
 /// Trains the codes of the Gaussians on the masks that were found and followed, never on the result of the votes.
@@ -205,3 +226,5 @@ fn unknown(views: &[ViewReport], photos: &[Photo], share: f64) -> Option<String>
 
 #[cfg(test)]
 mod tests;
+#[cfg(test)]
+mod vector_tests;

@@ -1,0 +1,70 @@
+//! Embeddings of Gaussians beside an unchanged splat: splat-distiller's `<checkpoint>_features.pt`, and LUDVIG's
+//! `features.npy` beside `gaussians.ply`.
+
+use std::path::{Path, PathBuf};
+
+use super::decoder::Decoder;
+use super::face::{EmbeddedLevel, LevelCodes, LevelValues, Method, MethodResult};
+use super::numpy;
+use super::rows::FeatureRows;
+use super::tensors::Tensors;
+use crate::io::{IoError, files, splat_ply};
+use crate::scene::GaussianCloud;
+
+/// LUDVIG's files.
+pub(super) const FEATURES: &str = "features.npy";
+const GAUSSIANS: &str = "gaussians.ply";
+/// End of the names of splat-distiller's files.
+pub(super) const DISTILLED: &str = "_features.pt";
+/// Numbers of an OpenCLIP embedding.
+const CLIP: usize = 512;
+
+/// Reads LUDVIG's result.
+pub(super) fn ludvig(file: &Path) -> Result<MethodResult, IoError> {
+    let splat = files::folder_of(file).join(GAUSSIANS);
+    let features = numpy::read(file)?.rows(file, "features")?;
+    if features.dim() != CLIP {
+        let what = format!(
+            "features of {} numbers, with which no phrase can be compared (CLIP's have {CLIP})",
+            features.dim()
+        );
+        return Err(IoError::Unsupported { path: file.into(), what, remedy: "open its Gaussians alone" });
+    }
+    assembled(Method::Ludvig, &splat, splat_ply::read(&splat)?, features)
+}
+
+/// Reads splat-distiller's result.
+pub(super) fn distilled(file: &Path) -> Result<MethodResult, IoError> {
+    let mut tensors = Tensors::open(file)?;
+    let name = tensors.names().next().unwrap_or_default().to_owned();
+    let features = tensors.half_rows(&name)?;
+    if features.dim() != CLIP {
+        let what = format!(
+            "features of {} numbers, with which no phrase can be compared (CLIP's have {CLIP})",
+            features.dim()
+        );
+        return Err(IoError::Unsupported { path: file.into(), what, remedy: "distill SAMOpenCLIP's features" });
+    }
+    let splat = splat_of(file).ok_or_else(|| IoError::Unsupported {
+        path: file.into(),
+        what: "features of Gaussians, whose .ply was not found".into(),
+        remedy: "export the checkpoint as .ply and put it beside the features, with the same name",
+    })?;
+    assembled(Method::SplatDistiller, &splat, splat_ply::read(&splat)?, features)
+}
+
+fn assembled(method: Method, splat: &Path, cloud: GaussianCloud, rows: FeatureRows) -> Result<MethodResult, IoError> {
+    let decoder = Decoder::none(rows.dim());
+    let level = EmbeddedLevel { codes: LevelCodes::Dense(rows), is_unit: false, decoder };
+    MethodResult::of_one_cloud(method, splat, cloud, vec![("features".into(), LevelValues::Embedded(level))])
+}
+
+/// The splat that the features were made for.
+fn splat_of(file: &Path) -> Option<PathBuf> {
+    let name = file.file_name()?.to_string_lossy();
+    let mut stem = name.strip_suffix(DISTILLED)?;
+    for end in ["_refined", "_filtered"] {
+        stem = stem.strip_suffix(end).unwrap_or(stem);
+    }
+    Some(files::folder_of(file).join(format!("{stem}.ply"))).filter(|splat| splat.is_file())
+}

@@ -1,0 +1,72 @@
+//! SAGA: `contrastive_feature_point_cloud.ply` with `f_0..31` and `scale_gate.pt` of one iteration, and the Gaussians
+//! with their colors in `scene_point_cloud.ply` of another.
+
+use std::path::{Path, PathBuf};
+
+use super::face::{LevelValues, Method, MethodResult, ScaleGate};
+use super::folder;
+use super::rows::FeatureRows;
+use super::tensors::Tensors;
+use crate::io::ply::{Column, Ply, Table};
+use crate::io::{IoError, files, memory, splat_ply};
+
+/// File of the features.
+pub(super) const FEATURES: &str = "contrastive_feature_point_cloud.ply";
+/// Start of the properties' names.
+const PREFIX: &str = "f_";
+/// File of LaGa, which has features like SAGA's.
+const LAGAS: &str = "multi_lvl_cluster_features.pth";
+const GATE: &str = "scale_gate.pt";
+
+/// Reads a result; `file` has the features.
+pub(super) fn read(file: &Path) -> Result<MethodResult, IoError> {
+    if files::folder_of(file).join(LAGAS).is_file() {
+        let what = "LaGa's descriptors of clusters".into();
+        return Err(IoError::Unsupported { path: file.into(), what, remedy: "open scene_point_cloud.ply alone" });
+    }
+    let features = features(file)?;
+    let splat = splat_of(file).ok_or_else(|| IoError::Unsupported {
+        path: file.into(),
+        what: "Gaussians without colors, whose colored ones (scene_point_cloud.ply) were not found".into(),
+        remedy: "open the folder of the run",
+    })?;
+    let cloud = splat_ply::read(&splat)?;
+    let gate = files::folder_of(file).join(GATE);
+    let gate = if gate.is_file() { Some(scale_gate(&gate, features.dim())?) } else { None };
+    let level = LevelValues::Affinity { features, gate };
+    MethodResult::of_one_cloud(Method::Saga, &splat, cloud, vec![("affinities".into(), level)])
+}
+
+fn splat_of(file: &Path) -> Option<PathBuf> {
+    let run = folder::run_of(file);
+    let names = ["scene_point_cloud.ply", "point_cloud.ply"];
+    names.iter().find_map(|name| folder::latest(&run, name).or_else(|| folder::latest(files::folder_of(file), name)))
+}
+
+fn features(file: &Path) -> Result<FeatureRows, IoError> {
+    let bytes = files::read(file, u64::MAX)?;
+    let ply = Ply::parse(&bytes, file)?;
+    let table = ply.table("vertex")?.ok_or_else(|| ply.syntax("vertex", "missing".into()))?;
+    let columns: Vec<&Column> = (0..).map_while(|k| table.column(&format!("{PREFIX}{k}"))).collect();
+    let (bytes, limit) = ((table.rows * columns.len() * size_of::<f32>()) as u64, memory::budget());
+    if bytes > limit {
+        let remedy = "free some memory";
+        return Err(IoError::OverBudget { path: file.into(), what: "its features", bytes, limit, remedy });
+    }
+    let rows = FeatureRows::new(columns.len(), values(&table, &columns));
+    rows.ok_or_else(|| ply.syntax("vertex", "no properties f_0, f_1, ...".into()))?.finite(file, PREFIX)
+}
+
+fn values(table: &Table<'_>, columns: &[&Column]) -> Vec<f32> {
+    (0..table.rows).flat_map(|i| columns.iter().map(move |c| c.f32(table.row(i)))).collect()
+}
+
+fn scale_gate(file: &Path, dim: usize) -> Result<ScaleGate, IoError> {
+    let mut tensors = Tensors::open(file)?;
+    let (weight, bias) = (tensors.floats("0.weight")?, tensors.floats("0.bias")?);
+    if weight.len() != dim || bias.len() != dim {
+        let reason = format!("has {} weights and {} biases for features of {dim} numbers", weight.len(), bias.len());
+        return Err(tensors.error("0.weight", reason));
+    }
+    Ok(ScaleGate { weight, bias })
+}

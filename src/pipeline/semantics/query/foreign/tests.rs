@@ -1,0 +1,302 @@
+//! Answers from the samples of other methods, compared with a plain reference (`tools/results/reference.py`).
+
+use std::sync::Arc;
+
+use super::asked::{ForeignScene, ForeignView};
+use super::blend::BlendedCodes;
+use super::click::ClickedFeature;
+use super::*;
+use crate::io::results::tests::{expected, sample};
+use crate::io::results::{LevelValues, MethodResult};
+use crate::render::Renderer;
+use crate::scene::{Level, NO_IDENTITY};
+
+/// Largest difference from the reference.
+const TOLERANCE: f32 = 1e-4;
+
+/// Largest difference of numbers.
+fn apart(a: &[f32], b: &[f32]) -> f32 {
+    assert_eq!(a.len(), b.len());
+    a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max)
+}
+
+/// The phrase of the samples, and its canonicals.
+struct Texts(Vec<Vec<f32>>);
+
+impl Texts {
+    fn of(path: &str, dim: usize) -> Self {
+        Self(expected(path).chunks_exact(dim).map(<[f32]>::to_vec).collect())
+    }
+
+    fn new() -> Self {
+        Self::of("scene/texts.npy", 512)
+    }
+
+    fn phrase(&self) -> ForeignPhrase<'_> {
+        ForeignPhrase { query: &self.0[0], canonical: &self.0[1..], temperature: 10.0 }
+    }
+
+    fn all(&self) -> Vec<&[f32]> {
+        self.0.iter().map(Vec::as_slice).collect()
+    }
+}
+
+/// A sample with a view of its first camera.
+struct Seen {
+    scene: ForeignScene,
+    view: ForeignView,
+    renderer: Renderer,
+}
+
+impl Seen {
+    fn new(path: &str) -> Self {
+        // LUDVIG and splat-distiller leave no cameras: those of another sample are the same.
+        let camera = sample("gaussian_grouping").cameras[0].camera.clone();
+        Self::of(sample(path), &camera)
+    }
+
+    fn of(result: MethodResult, camera: &crate::scene::Camera) -> Self {
+        let scene = ForeignScene::new(Arc::new(result));
+        let mut renderer = Renderer::new();
+        let view = scene.look(&mut renderer, camera).expect("drawn");
+        Self { scene, view, renderer }
+    }
+
+    fn relevancy(&mut self, level: usize, phrase: ForeignPhrase<'_>) -> Vec<f32> {
+        self.scene.pixel_relevancy(&mut self.renderer, &self.view, level, phrase).expect("answered")
+    }
+}
+
+/// Blended numbers, pixel after pixel.
+fn interleaved(blended: &BlendedCodes) -> Vec<f32> {
+    (0..blended.alpha.len()).flat_map(|i| blended.planes.iter().map(move |plane| plane[i])).collect()
+}
+
+/// Compares relevancy of Gaussians and pixels of a level with the reference; returns the largest difference.
+fn relevancy_apart(seen: &mut Seen, level: usize, folder: &str, suffix: &str, texts: &Texts) -> f32 {
+    let gaussians = seen.scene.gaussian_relevancy(level, texts.phrase()).expect("answered");
+    let pixels = seen.relevancy(level, texts.phrase());
+    let of = |name: &str| expected(&format!("{folder}/expected/relevancy_{name}{suffix}.npy"));
+    apart(&gaussians, &of("gaussians")).max(apart(&pixels, &of("pixels")))
+}
+
+#[test]
+fn levels_of_langsplat_answer_like_the_reference() {
+    let texts = Texts::new();
+    for (folder, place, codes) in
+        [("langsplat", "langsplat/output", "codes"), ("langsplat_v2", "langsplat_v2/output", "weights")]
+    {
+        let mut seen = Seen::new(place);
+        for level in 0..3 {
+            let blended = interleaved(seen.view.blended(level).expect("blended"));
+            let wanted = expected(&format!("{folder}/expected/{codes}_pixels_{}.npy", level + 1));
+            assert!(apart(&blended, &wanted) < TOLERANCE, "{folder} {level}");
+            let difference = relevancy_apart(&mut seen, level, folder, &format!("_{}", level + 1), &texts);
+            assert!(difference < TOLERANCE, "{folder} {level}: {difference}");
+            let other = relevancy_apart(&mut seen, level, folder, &format!("_{}", (level + 1) % 3 + 1), &texts);
+            assert!(other > 10.0 * TOLERANCE, "the control, a level exchanged: {other}");
+        }
+    }
+}
+
+#[test]
+fn a_layer_exchanged_or_a_codebook_turned_is_noticed() {
+    use crate::io::results::{Decoder, DecoderStep, LinearLayer};
+    let texts = Texts::new();
+    let path = std::path::Path::new("x");
+    // Two layers of LangSplat's decoder change places.
+    let mut result = sample("langsplat/output");
+    let LevelValues::Embedded(level) = &mut result.levels[0].values else { panic!("no embeddings") };
+    let (before, last) = level.decoder.split();
+    let mut steps = before.to_vec();
+    steps.swap(2, 4);
+    steps.push(DecoderStep::Linear(last.expect("a layer").clone()));
+    level.decoder = Decoder::new(3, steps, path).expect("fits");
+    let camera = result.cameras[0].camera.clone();
+    let difference = relevancy_apart(&mut Seen::of(result, &camera), 0, "langsplat", "_1", &texts);
+    assert!(difference > 10.0 * TOLERANCE, "{difference}");
+    // LangSplatV2's codebook is read column by column.
+    let mut result = sample("langsplat_v2/output");
+    let LevelValues::Embedded(level) = &mut result.levels[0].values else { panic!("no embeddings") };
+    let book = expected("langsplat_v2/expected/codebook_1.npy");
+    let turned: Vec<f32> = (0..6 * 512).map(|i| book[i % 512 * 6 + i / 512]).collect();
+    let turned = LinearLayer::of_codebook([6, 512], &turned, path).expect("fits");
+    level.decoder = Decoder::new(6, vec![DecoderStep::Linear(turned)], path).expect("fits");
+    let difference = relevancy_apart(&mut Seen::of(result, &camera), 0, "langsplat_v2", "_1", &texts);
+    assert!(difference > 10.0 * TOLERANCE, "{difference}");
+}
+
+#[test]
+fn embeddings_of_gaussians_answer_like_the_reference() {
+    let texts = Texts::new();
+    for (folder, place, levels) in
+        [("occams_lgs", "occams_lgs", 3), ("ludvig", "ludvig", 1), ("legaussians", "legaussians/output", 1)]
+    {
+        let mut seen = Seen::new(place);
+        for level in 0..levels {
+            let suffix = if levels > 1 { format!("_{}", level + 1) } else { String::new() };
+            let difference = relevancy_apart(&mut seen, level, folder, &suffix, &texts);
+            // Occam's embeddings are kept in half the memory.
+            let most = if folder == "occams_lgs" { 1e-3 } else { TOLERANCE };
+            assert!(difference < most, "{folder} {level}: {difference}");
+        }
+    }
+    let own = Texts::of("dr_splat/expected/texts.npy", 24);
+    let difference = relevancy_apart(&mut Seen::new("dr_splat"), 0, "dr_splat", "", &own);
+    assert!(difference < TOLERANCE, "{difference}");
+    let mut seen = Seen::new("legaussians/output");
+    let hot = ForeignPhrase { temperature: 100.0, ..texts.phrase() };
+    let wanted = expected("legaussians/expected/relevancy_pixels_temperature_100.npy");
+    assert!(apart(&seen.relevancy(0, hot), &wanted) < 10.0 * TOLERANCE);
+    assert!(apart(&seen.relevancy(0, texts.phrase()), &wanted) > 0.01, "the control: another temperature");
+}
+
+#[test]
+fn features_of_lseg_are_compared_like_the_reference() {
+    let texts = Texts::new();
+    for (place, prefix) in [("lseg", ""), ("lseg_speedup", "speedup_")] {
+        let mut seen = Seen::new(&format!("feature_3dgs/{place}"));
+        let all = texts.all();
+        let rows = |planes: Vec<Vec<f32>>| -> Vec<f32> {
+            (0..planes[0].len()).flat_map(|i| planes.iter().map(move |p| p[i]).collect::<Vec<_>>()).collect()
+        };
+        let wanted = |name: &str| expected(&format!("feature_3dgs/expected/{prefix}cosines_{name}.npy"));
+        let gaussians = rows(seen.scene.gaussian_cosines(0, &all).expect("answered"));
+        assert!(apart(&gaussians, &wanted("gaussians")) < TOLERANCE, "{place}");
+        let pixels = rows(seen.scene.pixel_cosines(&mut seen.renderer, &seen.view, 0, &all).expect("answered"));
+        let alpha = expected("scene/alpha_0.npy");
+        // Where nothing is, the decoder's bias has a direction.
+        let there = |i: usize| seen.view.blended(0).is_none() || alpha[i / 5] > 0.0;
+        let kept =
+            |v: Vec<f32>| v.into_iter().enumerate().filter(|(i, _)| there(*i)).map(|(_, v)| v).collect::<Vec<_>>();
+        assert!(apart(&kept(pixels), &kept(wanted("pixels"))) < TOLERANCE, "{place}");
+    }
+}
+
+#[test]
+fn classes_of_gaussian_grouping_are_those_of_its_classifier() {
+    let seen = Seen::new("gaussian_grouping");
+    let LevelValues::Classes { features, classifier } = &seen.scene.result.levels[0].values else {
+        panic!("no classes")
+    };
+    let blended = seen.view.blended(0).expect("blended");
+    let at = |name: &str| expected(&format!("gaussian_grouping/expected/{name}.npy"));
+    assert!(apart(&interleaved(blended), &at("features_pixels")) < TOLERANCE);
+    let numbers = |v: Vec<u32>| v.into_iter().map(|c| c as f32).collect::<Vec<f32>>();
+    let found = classes::of_gaussians(classifier, features);
+    assert_eq!(numbers(found.iter().map(|f| f.class).collect()), at("classes_gaussians"));
+    assert_eq!(numbers(classes::of_pixels(classifier, blended)), at("classes_pixels"));
+    let share = classes::share_of_gaussians(classifier, features, 7);
+    assert!(apart(&share, &at("probability_of_class_7_gaussians")) < TOLERANCE);
+    let pixels = classes::share_at_pixels(classifier, blended, 7);
+    assert!(apart(&pixels, &at("probability_of_class_7_pixels")) < TOLERANCE);
+    let other = classes::share_at_pixels(classifier, blended, 3);
+    assert!(apart(&other, &at("probability_of_class_7_pixels")) > 0.1, "the control: another class");
+    let texts = Texts::new();
+    let e = seen.scene.gaussian_relevancy(0, texts.phrase()).expect_err("no language").to_string();
+    assert!(e.contains("Gaussian Grouping"), "{e}");
+}
+
+#[test]
+fn a_click_in_saga_scores_like_the_reference() {
+    let seen = Seen::new("saga");
+    let LevelValues::Affinity { features, gate } = &seen.scene.result.levels[0].values else { panic!("no affinities") };
+    let blended = seen.view.blended(0).expect("blended");
+    let at: Vec<f32> = blended.planes.iter().map(|plane| plane[6 * 24 + 7]).collect();
+    assert!(apart(&at, &expected("saga/expected/feature_of_pixel.npy")) < TOLERANCE);
+    let wanted = expected("saga/expected/click_scores.npy");
+    let clicked = ClickedFeature::at(blended, 7, 6, gate.as_ref(), 0.5).expect("something is there");
+    assert!(apart(&clicked.gaussians(features), &wanted) < TOLERANCE);
+    assert!(clicked.pixels(blended)[6 * 24 + 7] > 1.0 - TOLERANCE, "the pixel itself");
+    let larger = ClickedFeature::at(blended, 7, 6, gate.as_ref(), 1.0).expect("something is there");
+    assert!(apart(&larger.gaussians(features), &wanted) > 10.0 * TOLERANCE, "the control: another scale");
+    let turned = ClickedFeature::at(blended, 6, 7, gate.as_ref(), 0.5).expect("something is there");
+    assert!(apart(&turned.gaussians(features), &wanted) > 10.0 * TOLERANCE, "the control: another pixel");
+    assert_eq!(ClickedFeature::at(blended, 24, 0, gate.as_ref(), 0.5), None);
+}
+
+#[test]
+fn clusters_of_open_gaussian_answer_like_the_reference() {
+    let texts = Texts::new();
+    let mut seen = Seen::new("opengaussian");
+    let LevelValues::Clusters(clusters) = &seen.scene.result.levels[0].values else { panic!("no clusters") };
+    let relevancy = seen.scene.cluster_relevancy(clusters, texts.phrase()).expect("answered");
+    assert!(apart(&relevancy, &expected("opengaussian/expected/relevancy_leaves.npy")) < TOLERANCE);
+    let own = seen.scene.own_mask(&mut seen.renderer, &seen.view, texts.phrase()).expect("answered");
+    let wanted = expected("opengaussian/expected/silhouette_pixels.npy");
+    let inside: Vec<usize> = (0..wanted.len()).filter(|i| wanted[*i] > 0.7).collect();
+    assert_eq!(own.mask.pixels().collect::<Vec<_>>(), inside);
+    assert!(!inside.is_empty());
+    // The best cluster alone covers less.
+    let fair = seen.scene.fair_mask(&mut seen.renderer, &seen.view, texts.phrase()).expect("answered");
+    assert!(!fair.mask.is_empty() && fair.rule != own.rule);
+}
+
+#[test]
+fn segments_of_thgs_answer_like_the_reference() {
+    let texts = Texts::new();
+    let mut seen = Seen::new("thgs");
+    for level in 0..3 {
+        let LevelValues::Clusters(clusters) = &seen.scene.result.levels[level].values else { panic!("no clusters") };
+        let relevancy = seen.scene.cluster_relevancy(clusters, texts.phrase()).expect("answered");
+        let wanted = expected(&format!("thgs/expected/relevancy_segments_{}.npy", level + 1));
+        assert!(apart(&relevancy, &wanted) < TOLERANCE, "{level}");
+    }
+    let wanted = expected("thgs/expected/member_of_three_best.npy");
+    let members = |levels| -> Vec<f32> {
+        seen.scene.members(texts.phrase().query, levels).into_iter().map(|m| f32::from(u8::from(m))).collect()
+    };
+    assert_eq!(members(1..3), wanted);
+    assert_ne!(members(0..1), wanted, "the control: another level");
+    let own = seen.scene.own_mask(&mut seen.renderer, &seen.view, texts.phrase()).expect("answered");
+    assert!(!own.mask.is_empty());
+}
+
+#[test]
+fn every_language_has_a_mask_by_its_own_rule_and_by_the_common_one() {
+    let texts = Texts::new();
+    for place in
+        ["langsplat/output", "langsplat_v2/output", "occams_lgs", "feature_3dgs/lseg_speedup", "legaussians/output"]
+    {
+        let mut seen = Seen::new(place);
+        let own = seen.scene.own_mask(&mut seen.renderer, &seen.view, texts.phrase()).expect(place);
+        let fair = seen.scene.fair_mask(&mut seen.renderer, &seen.view, texts.phrase()).expect(place);
+        assert!(!fair.mask.is_empty() && fair.rule != own.rule, "{place}");
+        // In a picture of this size, what LangSplat finds is a speck, which its rule takes away.
+        assert_eq!(own.mask.is_empty(), place == "langsplat/output", "{place}");
+    }
+    let mut seen = Seen::new("ludvig");
+    let none = seen.scene.own_mask(&mut seen.renderer, &seen.view, texts.phrase());
+    assert!(matches!(none, Err(ForeignError::NoRule("LUDVIG"))));
+    let short = ForeignPhrase { query: &[1.0; 24], canonical: &[], temperature: 10.0 };
+    let e = seen.scene.gaussian_relevancy(0, short).expect_err("another length").to_string();
+    assert!(e.contains("24") && e.contains("512") && e.contains("clip-vit-b16"), "{e}");
+}
+
+#[test]
+fn classes_and_clusters_become_a_semantic_map() {
+    let map = |path: &str| identities::semantic_map(&sample(path), identities::USUAL_SCALE);
+    let grouping = map("gaussian_grouping").expect("classes");
+    // Classes 7, 3 and 200; class 0 is nothing.
+    let names: Vec<String> = grouping.identities.iter().map(|(id, _)| grouping.identities.name(id)).collect();
+    assert_eq!(names, ["class 3", "class 7", "class 200"]);
+    let wanted = expected("gaussian_grouping/expected/classes_gaussians.npy");
+    for (id, class) in grouping.identity_of.iter().zip(&wanted) {
+        let name = if *class == 0.0 { "nothing".to_owned() } else { format!("class {class}") };
+        assert_eq!(grouping.identities.name(*id), name);
+    }
+    assert!(grouping.margin.iter().all(|m| (0.0..=1.0).contains(m)) && grouping.language.is_none());
+    let clusters = map("opengaussian").expect("clusters");
+    let language = clusters.language.as_ref().expect("embeddings");
+    assert!(language.is_valid(&clusters.identities) && language.encoder == "clip-vit-b16");
+    assert!(language.by_identity[0].raw.is_empty(), "seen three times");
+    assert_eq!(clusters.identities.len(), 12);
+    let thgs = map("thgs").expect("clusters");
+    assert_eq!((thgs.identities.count(Level::Object), thgs.identities.count(Level::Part)), (4, 8));
+    assert!(thgs.language.as_ref().is_some_and(|l| l.is_valid(&thgs.identities)));
+    assert_eq!(thgs.identity_of[9], NO_IDENTITY);
+    assert!(thgs.identities.iter().filter(|(_, i)| i.level == Level::Part).all(|(_, i)| i.parent != NO_IDENTITY));
+    let saga = map("saga").expect("objects");
+    assert_eq!(saga.identity_of.len(), 32);
+    assert!(matches!(map("langsplat/output"), Err(ForeignError::NoIdentities("LangSplat"))));
+}

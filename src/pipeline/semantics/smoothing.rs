@@ -1,0 +1,101 @@
+//! LangSplat's smoothing and cut of relevancy, which many methods are evaluated with.
+//!
+//! `avg` = 30 x 30 box filter (window x-15..x+14, edges mirrored); `v = (avg + relevancy) / 2`; `o` =
+//! `v` scaled to 0..1, then `clip(2 o - 1, 0, 1)`; mask = `o > 0.4`, then a 7 x 7 majority.
+
+use crate::scene::Mask;
+
+/// Side of the box filter, px.
+const BOX: usize = 30;
+/// Half the side of the majority filter, px.
+const MAJORITY: usize = 3;
+/// Cut of the normalized relevancy.
+const CUT: f32 = 0.4;
+
+/// Returns the mean around each pixel, and the mean of that and the pixel itself.
+pub(crate) fn smoothed(relevancy: &[f32], w: usize, h: usize) -> (Vec<f32>, Vec<f32>) {
+    let avg = box_filter(relevancy, w, h);
+    let v = avg.iter().zip(relevancy).map(|(a, r)| 0.5 * (a + r)).collect();
+    (avg, v)
+}
+
+/// The largest value; negative infinity if there is none.
+pub(crate) fn largest(v: &[f32]) -> f32 {
+    v.iter().copied().fold(f32::NEG_INFINITY, f32::max)
+}
+
+/// Returns the pixels whose normalized relevancy is over 0.4, without specks.
+pub(crate) fn cut(v: &[f32], w: usize, h: usize) -> Mask {
+    let (least, most) = v.iter().fold((f32::INFINITY, f32::NEG_INFINITY), |(l, m), x| (l.min(*x), m.max(*x)));
+    if most.is_nan() || most <= least {
+        return Mask::empty(w, h);
+    }
+    let kept = Mask::from_fn(w, h, |i| (2.0 * (v[i] - least) / (most - least) - 1.0).clamp(0.0, 1.0) > CUT);
+    majority(&kept)
+}
+
+/// Mean over a window of [`BOX`] x [`BOX`], edges mirrored without repeating the outermost pixel.
+fn box_filter(v: &[f32], w: usize, h: usize) -> Vec<f32> {
+    let mirror = |i: isize, n: usize| -> usize {
+        let period = (2 * n as isize - 2).max(1);
+        let i = i.rem_euclid(period);
+        i.min(period - i).clamp(0, n as isize - 1) as usize
+    };
+    let pass = |v: &[f64], w: usize, h: usize| -> Vec<f64> {
+        // Along rows, written transposed.
+        let mut out = vec![0.0; w * h];
+        let half = (BOX / 2) as isize;
+        for y in 0..h {
+            let row = &v[y * w..(y + 1) * w];
+            let mut sum: f64 = (-half..half).map(|k| row[mirror(k, w)]).sum();
+            for x in 0..w as isize {
+                out[x as usize * h + y] = sum / BOX as f64;
+                sum += row[mirror(x + half, w)] - row[mirror(x - half, w)];
+            }
+        }
+        out
+    };
+    let wide: Vec<f64> = v.iter().map(|x| f64::from(*x)).collect();
+    pass(&pass(&wide, w, h), h, w).into_iter().map(|x| x as f32).collect()
+}
+
+/// Pixels most of whose neighborhood is in the mask.
+fn majority(mask: &Mask) -> Mask {
+    let (w, h) = (mask.width_px(), mask.height_px());
+    Mask::from_fn(w, h, |i| {
+        let (x, y) = (i % w, i / w);
+        let (xs, ys) = (
+            x.saturating_sub(MAJORITY)..(x + MAJORITY + 1).min(w),
+            y.saturating_sub(MAJORITY)..(y + MAJORITY + 1).min(h),
+        );
+        let all = xs.len() * ys.len();
+        let inside: usize = ys.map(|y| xs.clone().filter(|x| mask.contains(y * w + x)).count()).sum();
+        2 * inside > all
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_box_filter_is_a_mean_with_mirrored_edges() {
+        let (w, h) = (41, 33);
+        let v: Vec<f32> = (0..w * h).map(|i| ((i * 37) % 101) as f32).collect();
+        let got = box_filter(&v, w, h);
+        let mirror = |i: i64, n: usize| {
+            let i = i.abs();
+            if i >= n as i64 { 2 * n as i64 - 2 - i } else { i }
+        };
+        for (x, y) in [(0, 0), (20, 16), (40, 32), (3, 30)] {
+            let mut sum = 0.0;
+            for dy in -15..15_i64 {
+                for dx in -15..15_i64 {
+                    sum += v[(mirror(y + dy, h) * w as i64 + mirror(x + dx, w)) as usize];
+                }
+            }
+            let at = got[y as usize * w + x as usize];
+            assert!((at - sum / 900.0).abs() < 1e-3, "{x} {y}: {at} {}", sum / 900.0);
+        }
+    }
+}
