@@ -9,6 +9,8 @@ impl Queries {
         let typed = self.sides.each_ref().map(|side| side.typed.clone());
         let pinned = self.pinned_texts();
         self.clear();
+        // The scene that was clicked to be opened may have been in the second view.
+        self.work_in(false);
         let Some(semantics) = goes_on else { return };
         for (second, text) in [false, true].into_iter().zip(&typed) {
             if !text.trim().is_empty() {
