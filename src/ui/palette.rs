@@ -128,21 +128,29 @@ fn matches(query: &str, layout: &Layout, selection: Option<(&Identities, Identit
         let title = title(&a);
         (a, title)
     });
-    let mut found: Vec<(Action, String)> = of_selection.into_iter().chain(of_window).filter(is_asked_for).collect();
+    let mut found: Vec<(Action, String)> = of_selection.into_iter().filter(is_asked_for).collect();
+    let selected = found.len();
+    found.extend(of_window.filter(is_asked_for));
     // The name of a pane is most likely a request for that pane.
     let is_pane = |a: &Action| match a {
         Action::ShowPane(pane) | Action::TogglePane(pane) => pane.text().to_lowercase().starts_with(&query),
         _ => false,
     };
-    found.sort_by_key(|(action, title)| {
+    let rank = |(at, (action, title)): &(usize, (Action, String))| {
         let title = title.to_lowercase();
         if title.starts_with(&query) || is_pane(action) {
             return 0;
         }
         let text = format!("{title} {}", other_words(action));
-        if words.iter().all(|word| begins_a_word(&text, word)) { 1 } else { 2 }
-    });
-    found
+        match words.iter().all(|word| begins_a_word(&text, word)) {
+            // "delete" is more likely said of what is selected than of the scene.
+            true => usize::from(*at >= selected),
+            false => 2,
+        }
+    };
+    let mut found: Vec<_> = found.into_iter().enumerate().collect();
+    found.sort_by_key(rank);
+    found.into_iter().map(|(_, found)| found).collect()
 }
 
 /// True if one of the words of a text begins with these letters.
@@ -158,6 +166,8 @@ fn other_words(action: &Action) -> &'static str {
         Action::LookFrom(_) => "view",
         Action::Remove(_) => "delete",
         Action::TogglePane(_) => "close",
+        Action::Guide | Action::News | Action::About => "help",
+        Action::ExportPly => "save",
         _ => "",
     }
 }
@@ -266,6 +276,7 @@ mod tests {
         let first = |query: &str| matches(query, &Layout::default(), Some((&all, mug))).swap_remove(0).1;
         for (query, title) in [
             ("top", "Look from the top"),
+            ("help", "Guide"),
             ("move", "Move, turn or recolor: mug"),
             ("export", "Export Gaussians: mug"),
             ("crop", "Crop box"),
@@ -275,7 +286,7 @@ mod tests {
             ("video", "Export video\u{2026}"),
             ("mask", "Find objects with other masks\u{2026}"),
             ("photo", "Show the photos pane"),
-            ("delete", "Delete this scene\u{2026}"),
+            ("delete", "Remove and fill: mug"),
             ("view top", "Look from the top"),
         ] {
             assert_eq!(first(query), title, "{query}");

@@ -184,15 +184,15 @@ impl Tree<'_> {
             let padding = ui.spacing().button_padding.x;
             self.facts.conflicts(ui, id, cx);
             ui.spacing_mut().button_padding.x = padding;
-            // Other rows keep its room free, so that no name moves under the pointer.
-            let room = vec2(MENU_PT, ui.available_height());
-            ui.allocate_ui_with_layout(room, Layout::right_to_left(Align::Center), |ui| {
-                ui.set_min_width(MENU_PT);
-                if is_hovered || self.selected == Some(id) || *self.menu_of == Some(id) {
+            // Names begin at the left, so none moves under the pointer; a long one is cut there.
+            if is_hovered || self.selected == Some(id) || *self.menu_of == Some(id) {
+                let room = vec2(MENU_PT, ui.available_height());
+                ui.allocate_ui_with_layout(room, Layout::right_to_left(Align::Center), |ui| {
+                    ui.set_min_width(MENU_PT);
                     ui.spacing_mut().button_padding.x = 4.0;
                     self.menu(ui, id, cx);
-                }
-            });
+                });
+            }
             ui.with_layout(Layout::left_to_right(Align::Center), |ui| self.name(ui, id, cx));
         });
     }

@@ -128,6 +128,58 @@ fn all_of_a_session_is_done_by_keys_alone() {
     assert!(w.app().state.error.is_none());
 }
 
+#[test]
+fn the_tools_of_the_view_are_used_by_keys_alone() {
+    let folder = tempfile::tempdir().expect("folder");
+    let mut w = edits::window(folder.path());
+    let press = |w: &mut Window, name: &str| {
+        tab_to(w, Role::Button, name);
+        w.press(Key::Enter);
+        w.harness.run_steps(2);
+    };
+    palette(&mut w, "gaussians by brush");
+    assert!(w.shows("New object: "));
+    press(&mut w, "Lasso");
+    assert!(w.shows("draw a loop"));
+    press(&mut w, "Cancel");
+    assert!(!w.shows("New object: "));
+
+    // A box is moved by a typed number, and taken back.
+    let cloud = |w: &Window| w.app().viewport.cloud().map(|cloud| cloud.positions.clone());
+    let before = cloud(&w);
+    w.press(Key::N);
+    palette(&mut w, "move, turn or recolor");
+    assert!(w.shows("drag an arrow or type values"));
+    tab_to(&mut w, Role::SpinButton, "Move along x, units");
+    w.types("0.5");
+    w.press(Key::Enter);
+    press(&mut w, "Apply");
+    w.until("it is moved", |a| a.state.scene.as_ref().is_some_and(|s| s.out.ends_with("scene-edited")));
+    assert!(cloud(&w) != before);
+    w.press(Key::Escape);
+
+    // Part of the scene alone is shown, and all of it again.
+    w.press(Key::B);
+    w.harness.run_steps(2);
+    press(&mut w, "Crop");
+    press(&mut w, "Remove box");
+    w.press(Key::B);
+
+    // Measuring: another measure, and out.
+    w.press(Key::M);
+    w.harness.run_steps(2);
+    press(&mut w, "Angle");
+    press(&mut w, "Close");
+    assert!(!w.shows("Undo point"));
+
+    // A path around the scene, from the palette and by its buttons.
+    palette(&mut w, "turntable");
+    assert!(w.app().layout.shows(Pane::Camera));
+    press(&mut w, "Pause");
+    press(&mut w, "Add keyframe");
+    assert!(w.app().state.error.is_none());
+}
+
 /// Returns whether a node can have the keyboard or be clicked, and has no name.
 fn is_nameless(node: &egui_kittest::Node<'_>) -> bool {
     let it = node.accesskit_node();
