@@ -5,6 +5,9 @@ use crate::pipeline::observer::Progress;
 /// Phase of a job: the beginning of its stage's name, and its share of the job's time in percent, by experience.
 type Phase = (&'static str, f64);
 
+/// Least share of the phases up to the present one from whose time that of the others is told.
+const LEAST_SHARE: f64 = 0.2;
+
 /// Phases of a training.
 pub(crate) const TRAINING: &[Phase] = &[("Loading photos", 2.0), ("Training", 96.0), ("Measuring", 2.0)];
 /// Phases of finding objects and parts. A phase that is not needed is skipped.
@@ -120,11 +123,13 @@ impl WholeProgress {
         self.secs_before + self.stage_secs
     }
 
-    /// Seconds of the phases to come, if the present stage needs another `stage_left` s.
-    pub(crate) fn later_secs(&self, stage_left: f64) -> f64 {
-        let Some(at) = self.at else { return 0.0 };
+    /// Seconds of the phases to come, if the present stage needs another `stage_left` s. `None` in a phase that is too
+    /// short to tell.
+    pub(crate) fn later_secs(&self, stage_left: f64) -> Option<f64> {
+        let Some(at) = self.at else { return Some(0.0) };
         let so_far = self.shares_before + self.phases[at].1;
-        self.later() * (self.secs() + stage_left) / so_far
+        let is_told = so_far >= LEAST_SHARE * (so_far + self.later());
+        is_told.then(|| self.later() * (self.secs() + stage_left) / so_far)
     }
 
     /// True if phases follow whose time is a guess.
@@ -182,9 +187,12 @@ mod tests {
         let mut whole = WholeProgress::of(EXPORT);
         assert!(!whole.is_guess(), "nothing has begun");
         whole.take(&report("Writing Gaussians", 5, 35.0));
-        assert_eq!((whole.is_guess(), whole.later_secs(35.0)), (true, 30.0));
+        assert_eq!((whole.is_guess(), whole.later_secs(35.0)), (true, Some(30.0)));
         whole.take(&report("Measuring the loss", 1, 3.0));
-        assert_eq!((whole.is_guess(), whole.later_secs(27.0)), (false, 0.0), "the last phase has none after it");
+        assert_eq!((whole.is_guess(), whole.later_secs(27.0)), (false, Some(0.0)), "the last phase has none after it");
+        let mut whole = WholeProgress::of(TRAINING);
+        whole.take(&report("Loading photos", 5, 20.0));
+        assert_eq!(whole.later_secs(20.0), None, "a slow disk says nothing of the training");
     }
 
     #[test]

@@ -5,6 +5,7 @@
 //! a name that is typed is one change.
 
 use std::collections::BTreeSet;
+use std::path::PathBuf;
 use std::sync::Arc;
 
 use crate::jobs::edit::EditRequest;
@@ -44,6 +45,8 @@ pub(crate) struct ViewState {
 pub(crate) struct EditSnapshot {
     /// Number of the scene; changes of another scene are forgotten.
     pub(crate) scene: u64,
+    /// Folder of the scene: a copy is derived at the first change of Gaussians.
+    pub(crate) folder: PathBuf,
     pub(crate) map: Option<Arc<SemanticMap>>,
     /// The Gaussians, if they are a result.
     pub(crate) cloud: Option<Arc<GaussianCloud>>,
@@ -323,7 +326,7 @@ mod tests {
             pinned: Default::default(),
             recipes: Default::default(),
         };
-        let now = EditSnapshot { scene: 1, map: Some(lamp()), cloud: None, view };
+        let now = EditSnapshot { scene: 1, folder: PathBuf::new(), map: Some(lamp()), cloud: None, view };
         let mut history = ChangeHistory::default();
         assert_eq!(history.settle(&now, None), None);
         (history, now)

@@ -378,6 +378,10 @@ impl<'a> Job<'a> {
         let evaluated = if end == TrainEnd::Finished && !scored { self.evaluate(observer) } else { Ok(()) };
         if let Some(scene) = &self.scene {
             self.info.history = self.history.clone();
+            let step = self.trainer.step; // of a stopped training, too
+            if self.history.steps.last().map_or(0, |s| s.step) < step {
+                self.info.history.steps.push(self.unreported.metrics(step, self.secs, self.trainer.cloud.len()));
+            }
             let map = objects_for(scene, &self.trainer.cloud, observer).map_err(TrainError::Save)?;
             scene.save(&self.info, &self.trainer.cloud, map.as_ref()).map_err(TrainError::Save)?;
         }

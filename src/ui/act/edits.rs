@@ -1,5 +1,6 @@
 //! Edits of objects and parts in the order of the requests, with undo and redo: each builds on the one before.
 
+use std::path::PathBuf;
 use std::sync::Arc;
 
 use super::remote;
@@ -7,7 +8,7 @@ use crate::jobs::JobError;
 use crate::jobs::edit::{self, EditRequest};
 use crate::jobs::rearrange::{RearrangeRequest, SplatChange, SplatEdit};
 use crate::jobs::select::empty_map;
-use crate::pipeline::observer::Observer;
+use crate::pipeline::observer::{Observer, Severity};
 use crate::pipeline::semantics::lifting::edit::Edit;
 use crate::scene::Identities;
 use crate::ui::app::App;
@@ -58,20 +59,26 @@ fn apply(app: &mut App, request: EditRequest) {
     let none = Identities::default();
     let all = app.state.semantics.as_ref().map_or(&none, |map| &map.identities);
     let what = Some(edit_text(&request, all));
-    start_edit(app, request, Editing { what, redo: false });
+    start_edit(app, request, None, Editing { what, redo: false });
 }
 
-/// Starts a change of objects and parts. Returns false if it is impossible.
-fn start_edit(app: &mut App, request: EditRequest, editing: Editing) -> bool {
+/// Starts a change of objects and parts, which is stored in the folder `also`, too. Returns false if it is impossible.
+fn start_edit(app: &mut App, request: EditRequest, also: Option<PathBuf>, editing: Editing) -> bool {
     let Some(SceneContext { scene, cloud, map, .. }) = SceneContext::new(app) else { return false };
     if remote::takes_edit(app, &request) {
         return false;
     }
     let map = map.map_or_else(|| Arc::new(empty_map(&cloud)), |map| Arc::clone(&map));
     let (cloud, out, workspace) = (Arc::clone(&cloud), scene.out.clone(), Arc::clone(&app.workspace));
-    let change = move |_: &mut dyn Observer| {
+    let change = move |observer: &mut dyn Observer| {
         let not_stored = |e| Stop::from(e).or_remedy("The change is not stored.");
-        workspace.edit_objects(&cloud, &map, &request, &out).map_err(not_stored)
+        let new = workspace.edit_objects(&cloud, &map, &request, &out).map_err(not_stored)?;
+        if let Some(folder) = also
+            && let Err(e) = workspace.edit_objects(&cloud, &map, &EditRequest::Restore(Arc::clone(&new)), &folder)
+        {
+            observer.note(Severity::Warning, format!("{} keeps its objects: {e}", folder.display()));
+        }
+        Ok::<_, Stop>(new)
     };
     app.editing = Some(editing);
     let started = app.start_in_scene(JobInfo::short("Editing objects"), change, |app, map| {
@@ -175,11 +182,14 @@ fn go_in_history(app: &mut App, redo: bool) {
     if !app.state.changes.has(&snapshot(app)) {
         let now = app.viewport.cloud().map(|cloud| Arc::clone(cloud));
         let editing = Editing { what: None, redo };
+        // A change that was made in the scene before a copy was derived from it is stored there.
+        let out = app.state.scene.as_ref().map(|scene| scene.out.clone());
+        let also = Some(to.folder).filter(|folder| Some(folder) != out.as_ref());
         let started = match (to.cloud, to.map) {
             (Some(cloud), map) if now.is_none_or(|now| !Arc::ptr_eq(&now, &cloud)) => {
                 start_rearrangement(app, SplatChange::Restore(cloud, map), editing)
             }
-            (_, Some(map)) => start_edit(app, EditRequest::Restore(map), editing),
+            (_, Some(map)) => start_edit(app, EditRequest::Restore(map), also, editing),
             (_, None) => false,
         };
         if !started {
@@ -225,7 +235,8 @@ pub(in crate::ui) fn snapshot(app: &App) -> EditSnapshot {
     };
     let map = app.state.semantics.as_deref().cloned();
     let cloud = viewport.cloud().filter(|_| app.state.is_trained()).map(|cloud| Arc::clone(cloud));
-    EditSnapshot { scene: app.state.scene_number, map, cloud, view }
+    let folder = app.state.scene.as_ref().map(|scene| scene.out.clone()).unwrap_or_default();
+    EditSnapshot { scene: app.state.scene_number, folder, map, cloud, view }
 }
 
 /// Records changes since the last call in the history, unless objects and parts are about to change. Camera path,

@@ -19,6 +19,8 @@ pub struct RunningJob {
     pub(crate) whole: WholeProgress,
     /// Remaining time in s, if known: a moving average, as the forecasts from rates jump.
     pub(crate) left_secs: Option<f64>,
+    /// Stage whose rate the remaining time is from.
+    left_stage: String,
     /// True if the job is paused.
     pub paused: bool,
     /// True if cancellation was requested.
@@ -28,7 +30,16 @@ pub struct RunningJob {
 impl RunningJob {
     pub(super) fn begun(id: JobId, info: JobInfo) -> Self {
         let whole = info.whole.clone();
-        Self { id, info, progress: None, whole, left_secs: None, paused: false, canceling: false }
+        Self {
+            id,
+            info,
+            progress: None,
+            whole,
+            left_secs: None,
+            left_stage: String::new(),
+            paused: false,
+            canceling: false,
+        }
     }
 
     /// Title, with a note if the job is paused or being canceled.
@@ -72,14 +83,20 @@ impl RunningJob {
         self.whole.take(&progress);
         let before = self.progress.replace(progress.clone()).filter(|p| is_planned || p.stage == progress.stage);
         let before = before.and(self.left_secs).map(|left| (self.whole.secs() - secs, left));
-        let with_later = |left: f64| left + self.whole.later_secs(left);
-        self.left_secs = match (progress.eta_secs().map(with_later), before) {
-            (Some(now), Some((step, left))) => {
+        let with_later = |left: f64| Some(left + self.whole.later_secs(left)?);
+        let is_of_stage = self.left_stage == progress.stage;
+        let now = progress.eta_secs().and_then(with_later);
+        if now.is_some() {
+            self.left_stage.clone_from(&progress.stage);
+        }
+        self.left_secs = match (now, before) {
+            // What another phase let expect was a guess.
+            (Some(now), Some((step, left))) if is_of_stage => {
                 let expected = left - step;
                 let smooth = expected + (now - expected) * (1.0 - (-step.max(0.0) / FORECAST_SECS).exp());
                 // At least half the forecast by the mean rate: a first rate may have been far too high.
                 let average = progress.elapsed_secs * progress.total as f64 / progress.done.max(1) as f64;
-                let average = with_later((average - progress.elapsed_secs).max(0.0));
+                let average = with_later((average - progress.elapsed_secs).max(0.0)).unwrap_or(now);
                 Some(smooth.max(0.5 * average.min(now)).max(0.0))
             }
             // Other phases follow.
@@ -148,6 +165,12 @@ mod tests {
         assert_eq!((job.fraction(), job.left_secs), (Some(0.7), Some(30.0)), "it goes on from there");
         job.goes_on(at("Measuring the loss", 70));
         assert_eq!((job.fraction(), job.left_secs), (Some(1.0), None));
+        // A second for the photos does not make minutes of the training.
+        let mut job = RunningJob::begun(JobId::Local(1), JobInfo::long("Training").phases(phases::TRAINING));
+        job.goes_on(Progress { rate: 10.0, ..at("Loading photos", 35) });
+        assert_eq!(job.left_secs, None);
+        job.goes_on(at("Training", 10));
+        assert!((60.0..65.0).contains(&job.left_secs.expect("known")), "{:?}", job.left_secs);
         // Control: a job of unknown phases has a bar for each, and none while nothing is counted.
         let mut job = RunningJob::begun(JobId::Local(1), JobInfo::long("Exporting"));
         assert_eq!(job.fraction(), None);
