@@ -4,6 +4,7 @@ use std::collections::BTreeSet;
 use std::path::PathBuf;
 use std::sync::Arc;
 
+use super::edit::{self, EditRequest};
 use super::{JobError, Scene, derived, measurements, open};
 use crate::io::SceneFolder;
 pub(crate) use crate::pipeline::splat_edit::{Arrangement, Grade, Placement, SplatEdit, apply};
@@ -20,6 +21,8 @@ pub(crate) fn applied(scene: &Scene, edit: &SplatEdit) -> Result<(GaussianCloud,
 pub enum SplatChange {
     /// An edit.
     Apply(SplatEdit),
+    /// An edit of objects and parts of a scene that has no folder yet.
+    Objects(EditRequest),
     /// Other Gaussians, with their objects and parts, for undo and redo.
     Restore(Arc<GaussianCloud>, Option<Arc<SemanticMap>>),
 }
@@ -63,7 +66,13 @@ pub struct RearrangedScene {
 /// If the edit is invalid or cannot be stored; nothing has changed then.
 pub(crate) fn run(request: &RearrangeRequest, known: Option<&str>) -> Result<RearrangedScene, JobError> {
     let RearrangeRequest { path, cloud, map, .. } = request;
+    // Photos show the scene as it is if only its objects differ.
+    let moved = !matches!(request.change, SplatChange::Objects(_));
     let (cloud, map, stale) = match &request.change {
+        SplatChange::Objects(change) => {
+            let before = map.as_deref().ok_or_else(|| JobError::NoObjects(path.clone()))?;
+            (Arc::clone(cloud), Some(edit::apply(cloud, before, change)?), BTreeSet::new())
+        }
         // Their measurements are restored, too.
         SplatChange::Restore(cloud, map) => (Arc::clone(cloud), map.clone(), BTreeSet::new()),
         SplatChange::Apply(edit) => {
@@ -80,7 +89,7 @@ pub(crate) fn run(request: &RearrangeRequest, known: Option<&str>) -> Result<Rea
         false => {
             let (scene, folder) = (open::scene(path)?, derived::free_folder(path, derived::EDITED));
             let name = derived::name(&request.name, derived::EDITED, &folder);
-            let state = derived::store(&scene, (name.clone(), true), &cloud, map.as_deref(), &folder)?;
+            let state = derived::store(&scene, (name.clone(), moved), &cloud, map.as_deref(), &folder)?;
             (folder, name, state)
         }
     };

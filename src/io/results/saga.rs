@@ -37,7 +37,8 @@ pub(super) fn read(file: &Path) -> Result<MethodResult, IoError> {
     MethodResult::of_one_cloud(Method::Saga, &splat, cloud, vec![("affinities".into(), level)])
 }
 
-fn splat_of(file: &Path) -> Option<PathBuf> {
+/// Finds the Gaussians with their colors.
+pub(super) fn splat_of(file: &Path) -> Option<PathBuf> {
     let run = folder::run_of(file);
     let names = ["scene_point_cloud.ply", "point_cloud.ply"];
     names.iter().find_map(|name| folder::latest(&run, name).or_else(|| folder::latest(files::folder_of(file), name)))
