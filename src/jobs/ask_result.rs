@@ -156,7 +156,7 @@ pub(crate) fn level_of(result: &MethodResult, wanted: &str) -> Result<usize, Job
     })
 }
 
-/// What a result has, and what it can be asked.
+/// Description of a result: its values, and the questions that it answers.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub(crate) struct ResultFacts {
     pub(crate) method: &'static str,

@@ -21,8 +21,10 @@ use crate::ui::state::{ShownReport, Tone};
 use crate::worker::{Failure, JobInfo, Makes};
 
 /// File endings of scenes.
-const SCENES: [&str; 13] =
-    [".ply", ".splat", ".ksplat", ".spz", ".sog", ".gltf", ".glb", ".json", ".toml", ".npy", ".bin", ".txt", ".zip"];
+const SCENES: [&str; 17] = [
+    ".ply", ".splat", ".ksplat", ".spz", ".sog", ".gltf", ".glb", ".json", ".toml", ".npy", ".bin", ".txt", ".zip",
+    ".pth", ".pt", ".ckpt", ".npz",
+];
 
 pub(in crate::ui) fn choose_folder(app: &mut App) {
     let request = FileRequest::folder(FileKind::Photos, "Open photos or a scene");

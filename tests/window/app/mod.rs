@@ -18,6 +18,7 @@ mod queries;
 mod rearranging;
 mod removing;
 mod report;
+mod results;
 mod runs;
 mod selecting;
 mod shapes;
