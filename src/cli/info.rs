@@ -158,9 +158,11 @@ fn of_splat(s: &Scene) -> Facts {
         lines.push(("cameras", format!("{} ({held_out} held out), beside it", s.cameras.len())));
     }
     lines.extend(s.dataset_path.as_ref().map(|path| ("photos", path.display().to_string())));
+    let known = s.known_semantics().ok().flatten().map(|map| map.identities.len());
     if let Some(r) = &result {
         lines.extend(r.levels.iter().map(|level| ("level", level.clone())));
         lines.extend(r.encoder.map(|encoder| ("text encoder", format!("{encoder} (see 'fmlgs models')"))));
+        lines.extend(known.map(|n| ("objects and parts", n.to_string())));
         lines.push(("answers", r.answers.into()));
         lines.push(("does not answer", r.refuses.into()));
         lines.extend(r.problem.as_ref().map(|why| ("cannot be read", why.clone())));
@@ -168,6 +170,7 @@ fn of_splat(s: &Scene) -> Facts {
     let mut facts = facts(lines, json, s.warnings.clone());
     facts.json.insert("kind".into(), json!(if result.is_some() { "result" } else { "splat" }));
     facts.json.insert("result".into(), json!(result));
+    facts.json.insert("identities".into(), json!(known));
     facts.json.insert("cameras".into(), json!(s.cameras));
     facts.json.insert("dataset".into(), json!(s.dataset_path));
     facts.json.insert("up".into(), json!(s.home().up));

@@ -9,8 +9,9 @@ use super::{JobError, Scene, derived, open};
 use crate::io::results::{self, Method, MethodKind, ResultOptions};
 use crate::io::splat_format::SplatFormat;
 use crate::pipeline::observer::{Observer, Severity, begin};
+use crate::pipeline::semantics::lifting::edit::{self, Edit};
 use crate::pipeline::semantics::query::foreign::identities::{USUAL_SCALE, semantic_map};
-use crate::scene::{GaussianCloud, Level, SemanticMap};
+use crate::scene::{GaussianCloud, Level, NO_IDENTITY, SemanticMap};
 
 /// A request to import a result or a plain training.
 #[derive(Clone, Debug)]
@@ -71,9 +72,7 @@ pub(crate) fn run(request: &ImportRequest, observer: &mut dyn Observer) -> Resul
         Some(method) => of_method(&scene, method, request, observer)?,
         None => Kept { cloud: Arc::clone(&scene.cloud), map: None, left_out: None },
     };
-    // What is left out on purpose is no news.
-    let known = scene.warnings.iter().filter(|_| scene.method.is_none_or(|m| m.kind() != MethodKind::Embeddings));
-    known.for_each(|warning| observer.note(Severity::Warning, warning.clone()));
+    scene.warnings.iter().for_each(|warning| observer.note(Severity::Warning, warning.clone()));
     begin("Writing the scene", observer)?;
     derived::store(&scene, (scene.name.clone(), false), &kept.cloud, kept.map.as_ref(), out)?;
     let stored = open::scene(out)?;
@@ -110,7 +109,12 @@ fn of_method(
         _ => Arc::new(results::open_result(path, &request.options)?),
     };
     begin("Finding its objects", observer)?;
-    let map = semantic_map(&result, request.scale.unwrap_or(USUAL_SCALE))?;
+    let mut map = semantic_map(&result, request.scale.unwrap_or(USUAL_SCALE))?;
+    if method == Method::Saga {
+        for (name, gaussians) in results::saved_selections(&result)?.into_iter().filter(|(_, g)| !g.is_empty()) {
+            map = edit::apply(&map, &result.cloud, &Edit::AddPiece { of: NO_IDENTITY, name, gaussians })?;
+        }
+    }
     let found = !map.identities.is_empty();
     let nothing = match method.kind() {
         MethodKind::Affinities => "no objects stand out among its features at this scale",
@@ -198,10 +202,18 @@ mod tests {
     }
 
     #[test]
-    fn sagas_objects_have_a_scale() {
+    fn sagas_objects_have_a_scale_and_its_saved_selections_their_names() {
         let folder = tempfile::tempdir().expect("folder");
-        let done = import("saga", &folder.path().join("scene"), Some(0.2)).expect("imported");
-        assert_eq!((done.method, done.gaussians), (Some("SAGA"), 32));
-        assert_eq!(done.objects == 0, done.left_out.is_some(), "what is not found is told");
+        let out = folder.path().join("scene");
+        let done = import("saga", &out, Some(0.2)).expect("imported");
+        assert_eq!((done.method, done.gaussians, done.left_out), (Some("SAGA"), 32, None));
+        let map = open::scene(&out).expect("opens").semantics().expect("objects");
+        let kettle = map.identities.iter().find(|(_, i)| i.names.iter().any(|n| n == "kettle"));
+        let members = map.members(kettle.expect("the selection's name").0);
+        assert_eq!(members.len(), 8);
+        let grouping = folder.path().join("grouping");
+        import("gaussian_grouping", &grouping, None).expect("imported");
+        let map = open::scene(&grouping).expect("opens").semantics().expect("objects");
+        assert!(map.identities.iter().all(|(_, i)| i.names.iter().all(|n| n != "kettle")), "the control");
     }
 }

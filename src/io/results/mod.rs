@@ -38,5 +38,6 @@ pub use folder::ResultOptions;
 pub use open::open_result;
 pub use product::ProductCodes;
 pub use rows::FeatureRows;
+pub use saga::saved_selections;
 pub use sniff::{SniffedResult, is_feature, sniff};
 pub use sparse::SparseRows;

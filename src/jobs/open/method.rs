@@ -6,7 +6,7 @@ use std::sync::Arc;
 use super::Scene;
 use crate::io::gs_output::{self, GsOutput};
 use crate::io::results::{self, MethodKind, MethodResult, ResultOptions};
-use crate::io::{self, Opened, files};
+use crate::io::{self, Opened, files, trainings};
 use crate::jobs::JobError;
 use crate::scene::{Axes, GaussianCloud};
 
@@ -27,18 +27,25 @@ pub(super) fn scene(path: &Path, axes: Option<Axes>) -> Result<Option<Scene>, Jo
         }
     }
     let (Opened::Cloud(cloud), training) = io::open_beside(&found.gaussians, axes)? else { return Ok(None) };
-    let mut scene = Scene::bare(path, cloud, Some(training.unwrap_or_else(beside)));
+    let mut scene = bare(path, cloud, training.unwrap_or_else(beside));
     scene.method = Some(found.method);
+    scene.warnings.retain(|warning| warning != trainings::MORE_VALUES);
     let name = found.method.name();
     scene.warnings.extend(problem.map(|e| format!("what {name} adds to the Gaussians cannot be read: {e}")));
     Ok(Some(scene))
+}
+
+/// Makes a scene of Gaussians, called like the folder of the run if nothing says its name.
+fn bare(path: &Path, cloud: GaussianCloud, mut beside: GsOutput) -> Scene {
+    beside.name = beside.name.take().or_else(|| path.is_dir().then(|| files::data_set_name(path)));
+    Scene::bare(path, cloud, Some(beside))
 }
 
 /// Makes a scene that shares the Gaussians with a result.
 fn with_result(path: &Path, mut result: MethodResult, beside: GsOutput) -> Scene {
     result.levels.iter_mut().for_each(|level| level.cloud = Arc::default());
     let cloud: GaussianCloud = Arc::unwrap_or_clone(std::mem::take(&mut result.cloud));
-    let mut scene = Scene::bare(path, cloud, Some(beside));
+    let mut scene = bare(path, cloud, beside);
     result.cloud = Arc::clone(&scene.cloud);
     result.levels.iter_mut().for_each(|level| level.cloud = Arc::clone(&scene.cloud));
     scene.method = Some(result.method);
