@@ -127,7 +127,7 @@ fn of_method(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::io::results::tests::{expected, samples};
+    use crate::io::results::tests::{copied, expected, samples};
     use crate::pipeline::observer::{Signal, Silent};
 
     fn import(sample: &str, out: &std::path::Path, scale: Option<f32>) -> Result<ImportedScene, JobError> {
@@ -137,7 +137,11 @@ mod tests {
             scale,
             options: ResultOptions::default(),
         };
-        run(&request, &mut Silent)
+        run_silently(&request)
+    }
+
+    fn run_silently(request: &ImportRequest) -> Result<ImportedScene, JobError> {
+        run(request, &mut Silent)
     }
 
     #[test]
@@ -176,6 +180,27 @@ mod tests {
             let scene = open::scene(&out).expect("opens");
             assert!(scene.cloud.extras.is_empty() && scene.known_semantics().expect("none").is_none());
         }
+    }
+
+    #[test]
+    fn photos_that_the_run_names_come_along() {
+        let folder = tempfile::tempdir().expect("folder");
+        let (run, photos) = (folder.path().join("run"), folder.path().join("data/made_up"));
+        copied(&samples().join("gaussian_grouping"), &run);
+        std::fs::create_dir_all(&photos).expect("made");
+        image::RgbImage::new(24, 18).save(photos.join("view_0.png")).expect("written");
+        let pose = [[1.0, 0.0, 0.0, 0.0], [0.0, -1.0, 0.0, 0.0], [0.0, 0.0, -1.0, -3.2], [0.0, 0.0, 0.0, 1.0]];
+        let frame = serde_json::json!({ "file_path": "view_0.png", "transform_matrix": pose });
+        let list = serde_json::json!({ "fl_x": 20.0, "cx": 12.0, "cy": 9.0, "w": 24, "h": 18, "frames": [frame] });
+        std::fs::write(photos.join("transforms.json"), list.to_string()).expect("written");
+        let out = folder.path().join("scene");
+        let request = ImportRequest { path: run, out: out.clone(), scale: None, options: ResultOptions::default() };
+        let done = run_silently(&request).expect("imported");
+        let found = done.photos.expect("its photos").canonicalize().expect("there");
+        assert_eq!(found, photos.canonicalize().expect("there"));
+        let scene = open::scene(&out).expect("opens");
+        let names: Vec<&str> = scene.cameras.iter().map(|c| c.name.as_str()).collect();
+        assert_eq!(names, ["view_0.png"], "the photos' own cameras");
     }
 
     #[test]

@@ -96,3 +96,39 @@ pub(crate) fn run(request: &RearrangeRequest, known: Option<&str>) -> Result<Rea
     let facts = request.facts.clone().with_edited(&cloud, &request.cameras);
     Ok(RearrangedScene { cloud, map, folder, name, state, facts, stale })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::io::results::tests::{copied, samples};
+    use crate::pipeline::semantics::lifting::edit::Edit;
+
+    #[test]
+    fn the_first_edit_of_objects_makes_a_scene_of_a_result() {
+        let folder = tempfile::tempdir().expect("folder");
+        let path = folder.path().join("run");
+        copied(&samples().join("gaussian_grouping"), &path);
+        let scene = open::scene(&path).expect("opens");
+        let map = scene.semantics().expect("its classes");
+        let request = |change| RearrangeRequest {
+            path: path.clone(),
+            name: "run".into(),
+            is_edited: false,
+            cloud: Arc::clone(&scene.cloud),
+            map: Some(Arc::new(map.clone())),
+            change: SplatChange::Objects(EditRequest::Apply(change)),
+            measurements: Vec::new(),
+            facts: SceneFacts::default(),
+            cameras: Vec::new(),
+        };
+        let done = run(&request(Edit::Rename(1, "kettle".into())), None).expect("stored");
+        assert_eq!((done.folder.clone(), done.name.as_str()), (folder.path().join("run-edited"), "run edited"));
+        assert!(Arc::ptr_eq(&done.cloud, &scene.cloud), "the Gaussians are the same");
+        let stored = open::scene(&done.folder).expect("opens");
+        assert_eq!((stored.edited, stored.cameras.len()), (false, 2), "photos show it as it is");
+        assert_eq!(stored.semantics().expect("objects").identities.name(1), "kettle");
+        // The control: an edit that makes no sense stores nothing.
+        assert!(run(&request(Edit::Rename(9, "x".into())), None).is_err());
+        assert!(!folder.path().join("run-edited-2").exists());
+    }
+}
