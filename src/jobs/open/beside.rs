@@ -8,6 +8,7 @@ use super::tolerant::photos_of;
 use super::{OpenedScene, Scene};
 use crate::io::gs_output::{self, GsOutput};
 use crate::io::photo_source::PhotoSource;
+use crate::io::results::MethodKind;
 use crate::io::scene_files::{SELECTION_FILE, is_scene};
 use crate::io::trained::SceneCamera;
 use crate::pipeline::observer::{Observer, Severity};
@@ -55,7 +56,12 @@ pub(super) fn add_to(scene: &mut Scene, training: Option<GsOutput>) {
 /// Opens Gaussians of another program, with their photos or cameras if there are any.
 pub(super) fn with_photos(scene: Scene, observer: &mut dyn Observer) -> OpenedScene {
     if let Some(method) = scene.method {
-        observer.note(Severity::Info, format!("{} is a result of {}", scene.name, method.name()));
+        let so = match method.kind() {
+            MethodKind::Classes | MethodKind::Clusters => "its groups of Gaussians are objects",
+            MethodKind::Affinities => "'fmlgs import' finds its objects",
+            MethodKind::Embeddings => "'fmlgs query' asks its embeddings",
+        };
+        observer.note(Severity::Info, format!("{} is a result of {}: {so}", scene.name, method.name()));
     }
     let seen = scene.dataset_path.is_some().then(|| photos_of(&scene, observer)).flatten();
     let dataset = seen.or_else(|| photos_unseen(&scene)).map(Arc::new);
