@@ -188,7 +188,8 @@ mod tests {
         let (run, photos) = (folder.path().join("run"), folder.path().join("data/made_up"));
         copied(&samples().join("gaussian_grouping"), &run);
         std::fs::create_dir_all(&photos).expect("made");
-        image::RgbImage::new(24, 18).save(photos.join("view_0.png")).expect("written");
+        let colors = image::RgbImage::from_fn(24, 18, |x, y| image::Rgb([10 * x as u8, 10 * y as u8, 90]));
+        colors.save(photos.join("view_0.png")).expect("written");
         let pose = [[1.0, 0.0, 0.0, 0.0], [0.0, -1.0, 0.0, 0.0], [0.0, 0.0, -1.0, -3.2], [0.0, 0.0, 0.0, 1.0]];
         let frame = serde_json::json!({ "file_path": "view_0.png", "transform_matrix": pose });
         let list = serde_json::json!({ "fl_x": 20.0, "cx": 12.0, "cy": 9.0, "w": 24, "h": 18, "frames": [frame] });
