@@ -92,7 +92,9 @@ impl SceneWork {
                 self.state = Some(state);
                 format!("{what}, stored in the scene")
             }
-            Ok(None) => format!("{what}, which is stored nowhere: only a trained scene keeps names"),
+            Ok(None) => {
+                format!("{what}, which is stored nowhere: only a trained scene keeps names ('fmlgs import' makes one)")
+            }
             Err(e) => self.failed(e),
         }
     }

@@ -5,6 +5,7 @@ use std::process::ExitCode;
 
 use super::{STOPPED, output};
 use crate::io::OpenError;
+use crate::io::results::MethodKind;
 use crate::jobs::error::chain;
 use crate::jobs::{JobError, poses};
 use crate::measure::BeginError;
@@ -52,6 +53,13 @@ impl CliError {
             JobError::Report(BeginError::Other(..)) => " (--out); --fresh forgets it".into(),
             JobError::NothingHeldOut(_) => "; --held-out-every 0 compares with all photos".into(),
             JobError::NoObjects(path) => format!("; find them with 'fmlgs preprocess {}'", path.display()),
+            JobError::NotGrouped { path, method } => match method.kind() {
+                MethodKind::Embeddings => {
+                    format!("; its embeddings answer phrases: 'fmlgs query {} PHRASE'", path.display())
+                }
+                _ => format!("; 'fmlgs import {} --out SCENE' makes some", path.display()),
+            },
+            JobError::NoScene(path) => format!("; 'fmlgs import {} --out SCENE' makes one of a splat", path.display()),
             JobError::UnknownPhoto(_) => "; see 'fmlgs info'".into(),
             JobError::NoMatch(_) => "; see 'fmlgs query'".into(),
             _ => return Self::Failed(Box::new(error)),

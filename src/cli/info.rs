@@ -12,7 +12,7 @@ use super::{CliError, output};
 use crate::io::scene_files::MAP_FILE;
 use crate::io::trained::CLOUD_FILE;
 use crate::jobs::open::{self, Contents};
-use crate::jobs::{Scene, measurements, plan};
+use crate::jobs::{Scene, ask_result, measurements, plan};
 use crate::pipeline::train::TrainConfig;
 use crate::scene::measurement::Measurement;
 use crate::scene::{Bounds, Dataset, PlanLine, ScenePlan, SemanticMap};
@@ -20,7 +20,7 @@ use crate::scene::{Bounds, Dataset, PlanLine, ScenePlan, SemanticMap};
 /// Say what a folder or file holds, and the plan for it
 ///
 /// Works on everything that can be opened: posed photos (COLMAP, transforms.json, Blender, LLFF),
-/// splats and trained scenes. The scene plan lists what the program leaves out for this scene on
+/// splats, trained scenes and results of other methods. The scene plan lists what the program leaves out for this scene on
 /// this machine, why, and what that saves.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  fmlgs info photos/\n  fmlgs info scene.ply --json | jq .gaussians\n  \
@@ -39,6 +39,9 @@ pub(crate) struct InfoArgs {
     #[arg(long)]
     json: bool,
 }
+
+/// Properties of a splat that are listed by name.
+const EXTRAS: usize = 8;
 
 /// Facts in two forms: label and text for display, and a JSON object.
 struct Facts {
@@ -147,14 +150,27 @@ fn of_dataset(d: &Dataset, holdout_every: usize) -> Facts {
 
 fn of_splat(s: &Scene) -> Facts {
     let (mut lines, json) = cloud_facts(s);
-    lines.insert(0, ("kind", "Gaussian splat".into()));
+    let result = ask_result::facts(s);
+    let kind = result.as_ref().map_or_else(|| "Gaussian splat".to_owned(), |r| format!("result of {}", r.method));
+    lines.insert(0, ("kind", kind));
     if !s.cameras.is_empty() {
         let held_out = s.cameras.iter().filter(|c| c.held_out).count();
         lines.push(("cameras", format!("{} ({held_out} held out), beside it", s.cameras.len())));
     }
     lines.extend(s.dataset_path.as_ref().map(|path| ("photos", path.display().to_string())));
+    let known = s.known_semantics().ok().flatten().map(|map| map.identities.len());
+    if let Some(r) = &result {
+        lines.extend(r.levels.iter().map(|level| ("level", level.clone())));
+        lines.extend(r.encoder.map(|encoder| ("text encoder", format!("{encoder} (see 'fmlgs models')"))));
+        lines.extend(known.map(|n| ("objects and parts", n.to_string())));
+        lines.push(("answers", r.answers.into()));
+        lines.push(("does not answer", r.refuses.into()));
+        lines.extend(r.problem.as_ref().map(|why| ("cannot be read", why.clone())));
+    }
     let mut facts = facts(lines, json, s.warnings.clone());
-    facts.json.insert("kind".into(), json!("splat"));
+    facts.json.insert("kind".into(), json!(if result.is_some() { "result" } else { "splat" }));
+    facts.json.insert("result".into(), json!(result));
+    facts.json.insert("identities".into(), json!(known));
     facts.json.insert("cameras".into(), json!(s.cameras));
     facts.json.insert("dataset".into(), json!(s.dataset_path));
     facts.json.insert("up".into(), json!(s.home().up));
@@ -228,7 +244,9 @@ fn cloud_facts(s: &Scene) -> (Vec<(&'static str, String)>, Value) {
         lines.push(("upwards", vector(up)));
     }
     if !extras.is_empty() {
-        lines.push(("kept besides", extras.join(", ")));
+        let shown = extras.iter().take(EXTRAS).copied().collect::<Vec<_>>().join(", ");
+        let more = extras.len().saturating_sub(EXTRAS);
+        lines.push(("kept besides", if more > 0 { format!("{shown} and {more} more") } else { shown }));
     }
     (lines, json!({ "gaussians": c.len(), "sh_degree": s.sh_stored, "bounds": bounds, "extras": extras }))
 }

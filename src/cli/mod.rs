@@ -23,6 +23,7 @@ mod eval_removal;
 mod export;
 mod generate;
 mod idle;
+mod import;
 mod info;
 mod interrupt;
 mod mcp;
@@ -41,6 +42,7 @@ mod render;
 mod report;
 mod report_merge;
 mod reproduce;
+mod result_args;
 mod scene_args;
 mod segment;
 mod segment_click;
@@ -92,6 +94,7 @@ Examples:
   fmlgs agent scene/ \"what is on the table?\"
   fmlgs mcp scene/                      let an AI assistant look around in it (Model Context Protocol)
   fmlgs export scene/ --out scene.ply   for any other splat viewer
+  fmlgs import RESULT --out scene/      a result of another method becomes a scene
   fmlgs batch jobs.toml --shard 1/4     many scenes, settings and seeds, on many machines
   fmlgs serve scene/                    show it to a window on another computer (fmlgs connect)
   fmlgs models                          neural networks: what is here, what each adds";
@@ -140,6 +143,7 @@ enum Command {
     Synth(synth::SynthArgs),
     Demo(demo::DemoArgs),
     Export(export::ExportArgs),
+    Import(import::ImportArgs),
     Batch(batch::BatchArgs),
     Bench(bench::BenchArgs),
     Report(report::ReportArgs),
@@ -229,6 +233,7 @@ fn run(cli: Cli, open_window: OpenWindow) -> Result<(), CliError> {
         Command::Demo(args) if args.headless || args.make.is_some() => demo::run(args, quiet),
         Command::Demo(_) => window(vec![Start::Demo], overrides, open_window),
         Command::Export(args) => export::run(args, quiet),
+        Command::Import(args) => import::run(args, quiet),
         Command::Batch(args) => batch::run(args, quiet),
         Command::Bench(args) => bench::run(args, quiet),
         Command::Report(args) => report::run(args, quiet),

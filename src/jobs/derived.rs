@@ -6,7 +6,8 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use super::{JobError, Scene, export_splat, measurements};
+use super::held_out::held_out;
+use super::{JobError, Scene, export_splat, measurements, open};
 use crate::io::splat_format::SplatFormat;
 use crate::io::trained::{self, SceneInfo};
 use crate::io::{IoError, SceneFolder, files};
@@ -99,6 +100,23 @@ fn drawn_as(from: &Scene) -> Result<serde_json::Value, JobError> {
     serde_json::to_value(config).map_err(|e| JobError::Output(e.to_string()))
 }
 
+/// Describes a scene that is made of a splat, with the cameras and photos that were found beside it. A splat file does
+/// not say how it is drawn; the scene's settings do from now on.
+fn of_bare(from: &Scene, out: &Path) -> Result<SceneInfo, JobError> {
+    let dataset = from.dataset_path.as_ref().and_then(|path| open::dataset(path).ok());
+    let found = dataset.map(|dataset| {
+        let known = !from.cameras.is_empty();
+        let held_out = if known { held_out(&dataset, &from.cameras, None, 0) } else { Vec::new() };
+        SceneInfo::of(&dataset, &held_out, out)
+    });
+    let without = || SceneInfo { cameras: from.cameras.clone(), ..SceneInfo::default() };
+    Ok(SceneInfo {
+        background: from.says_background.then_some(from.settings.background),
+        config: drawn_as(from)?,
+        ..found.unwrap_or_else(without)
+    })
+}
+
 /// Stores Gaussians that were derived from `from`, with their objects and parts, as the scene `name` in the folder
 /// `out`. `edited` marks that photos show the scene as it was before. Returns the id of its state.
 pub(crate) fn store(
@@ -113,8 +131,7 @@ pub(crate) fn store(
     check(out)?;
     let mut info = match &from.folder {
         Some(folder) => trained::load_info(folder)?,
-        // A splat file does not say how it is drawn; the scene's settings do from now on.
-        None => SceneInfo { config: drawn_as(from)?, ..SceneInfo::default() },
+        None => of_bare(from, out)?,
     };
     info.name = name;
     info.edited |= edited;
@@ -134,7 +151,6 @@ pub(crate) fn store(
 mod tests {
     use super::*;
     use crate::io::splat_ply;
-    use crate::jobs::open;
     use crate::scene::SplatRenderMode;
 
     #[test]

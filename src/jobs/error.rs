@@ -4,6 +4,7 @@ use std::error::Error;
 use std::path::PathBuf;
 
 use crate::io::memory::NoRoom;
+use crate::io::results::Method;
 use crate::io::{IoError, OpenError};
 use crate::measure::{BeginError, ReportError, StudyError};
 use crate::models::ModelError;
@@ -15,6 +16,7 @@ use crate::pipeline::observer::Interrupted;
 use crate::pipeline::removal::RemovalError;
 use crate::pipeline::semantics::lifting::edit::EditError;
 use crate::pipeline::semantics::lifting::error::FindError;
+use crate::pipeline::semantics::query::foreign::ForeignError;
 use crate::pipeline::splat_edit::SplatEditError;
 use crate::pipeline::synth::SynthError;
 use crate::pipeline::train::TrainError;
@@ -57,6 +59,16 @@ pub enum JobError {
     HeldOut(String),
     #[error("{} has no objects yet", .0.display())]
     NoObjects(PathBuf),
+    /// Result of another method without objects.
+    #[error("{}: the result of {} has no objects yet", .path.display(), .method.name())]
+    NotGrouped {
+        /// The result.
+        path: PathBuf,
+        /// Method that made it.
+        method: Method,
+    },
+    #[error(transparent)]
+    Foreign(#[from] ForeignError),
     #[error("the query is empty; type an object's name")]
     EmptyQuery,
     #[error("no match for '{0}'")]

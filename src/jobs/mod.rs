@@ -3,6 +3,7 @@
 //! Jobs take plain inputs and an [`Observer`](crate::pipeline::observer::Observer) if they take long, and return a
 //! typed result or a [`JobError`]. The caller reports the result in its own way.
 
+pub(crate) mod ask_result;
 pub(crate) mod batch;
 pub(crate) mod bench;
 pub(crate) mod changed;
@@ -27,6 +28,7 @@ pub mod find_objects;
 pub(crate) mod folders;
 pub(crate) mod go_to;
 pub(crate) mod held_out;
+pub(crate) mod import;
 pub(crate) mod inspect;
 pub(crate) mod measurements;
 pub(crate) mod models;

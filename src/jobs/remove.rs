@@ -164,9 +164,6 @@ const GUESSED: f32 = 0.5;
 
 /// Stores the result, which is without `name`, as a scene in the folder `out`; the one in `from` is unchanged.
 fn store(from: &Scene, name: &str, reduced: &ReducedScene, out: &Path) -> Result<(), JobError> {
-    if from.folder.is_none() {
-        return Err(JobError::NoScene(from.path.clone()));
-    }
     let name = format!("{} without {name}", from.name);
     derived::store(from, (name, false), &reduced.cloud, Some(&reduced.map), out)?;
     Ok(())

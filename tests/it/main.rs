@@ -14,6 +14,7 @@ mod cli_language_features;
 mod cli_networks;
 mod cli_paths;
 mod cli_report;
+mod cli_results;
 mod cli_round_trip;
 #[path = "../cli_support/mod.rs"]
 mod cli_support;

@@ -1,5 +1,6 @@
 //! `fmlgs query`: where in a view is what is asked for.
 
+mod foreign;
 mod phrases;
 
 use std::path::PathBuf;
@@ -8,6 +9,7 @@ use std::time::Instant;
 use serde_json::{Value, json};
 
 use super::recipe::RecipeArgs;
+use super::result_args::ResultArgs;
 use super::scene_args::open_scene;
 use super::{CliError, number, output, view};
 use crate::jobs::query::{self, QueryRequest, QueryResult};
@@ -25,16 +27,18 @@ const OFFERED: usize = 3;
 ///
 /// "X of the Y" and "Y's X" ask for a part. Answers by the names that identities have; what they look like to the
 /// encoder that has looked at them answers where nothing has a name, or if that encoder is CLIP, else it is an offer.
-/// --recipe paper asks as the paper does. Exit code 1 if nothing fits.
+/// --recipe paper asks as the paper does. A result of another method with language is asked by its own embeddings, with
+/// the mask by its own rule and by one that is the same for all. Exit code 1 if nothing fits.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  \
     fmlgs query scene/ \"a button of the red controller\"\n  \
     fmlgs query scene/ \"the lamp's shade\" --camera 12 --mask mask.png --heat heat.png\n  \
     fmlgs query scene/ lamp --kind object --json\n  \
     fmlgs query scene/ \"bear nose\" --recipe paper --heat heat.png\n  \
+    fmlgs query langsplat/output/ramen \"chopsticks\" --level small --out answer/\n  \
     fmlgs query scene/ --phrases words.txt --views all --export masks/ --truth true_masks/")]
 pub(crate) struct QueryArgs {
-    /// Trained scene with objects and parts ('fmlgs preprocess')
+    /// Trained scene with objects and parts ('fmlgs preprocess'), or a result of another method
     scene: PathBuf,
     /// Text of the object or part to find
     #[arg(required_unless_present = "phrases", conflicts_with = "phrases")]
@@ -74,12 +78,27 @@ pub(crate) struct QueryArgs {
     json: bool,
     #[command(flatten)]
     recipe: RecipeArgs,
+    /// Level of a result of another method, by name or by number from 1 [default: that of the largest relevancy]
+    #[arg(long, help_heading = "Results of other methods")]
+    level: Option<String>,
+    /// Write the relevancy and both masks of a result of another method into this folder
+    #[arg(long, value_name = "FOLDER", help_heading = "Results of other methods")]
+    out: Option<PathBuf>,
+    #[command(flatten)]
+    result: ResultArgs,
 }
 
 pub(crate) fn run(args: QueryArgs, quiet: bool) -> Result<(), CliError> {
     let scene = open_scene(&args.scene)?;
     for out in args.mask.iter().chain(&args.heat) {
         export::check(out, &query::MAP_ENDINGS, &scene.reads())?;
+    }
+    if let Some(method) = scene.method.filter(|m| scene.folder.is_none() && m.encoder().is_some()) {
+        return foreign::run(&args, &scene, method);
+    }
+    if args.level.is_some() || args.out.is_some() || args.result.is_given() {
+        let text = "are for results of other methods with language; this is none (--mask and --heat write files)";
+        return Err(CliError::Usage(format!("--level, --out, --decoder and --top-k {text}")));
     }
     let map = scene.semantics()?;
     if let Some(list) = &args.phrases {

@@ -11,8 +11,8 @@ use super::gs_output::GsOutput;
 use super::trained::{self, TrainedScene};
 use super::trainings::Training;
 use super::{
-    IoError, OpenError, alpha, colmap, files, gs_output, khr_gltf, ksplat, llff, pixel_masks, sog, splat, splat_ply,
-    spz, trainings, transforms, unposed,
+    IoError, OpenError, alpha, colmap, files, gs_output, khr_gltf, ksplat, llff, pixel_masks, results, sog, splat,
+    splat_ply, spz, trainings, transforms, unposed,
 };
 use crate::scene::{Axes, Dataset, GaussianCloud};
 
@@ -34,7 +34,7 @@ pub(crate) use among::data_set_around;
 type Result<T> = std::result::Result<T, OpenError>;
 
 /// Layouts of folders that are recognized, in this order, and the reader of each.
-const FOLDERS: [Layout; 8] = [
+const FOLDERS: [Layout; 9] = [
     Layout {
         name: "a trained scene (scene.json)",
         is_of_photos: false,
@@ -86,6 +86,16 @@ const FOLDERS: [Layout; 8] = [
         is_of_photos: false,
         is: |p| p.join(sog::META_FILE).is_file(),
         open: |p| Ok(Opened::Cloud(sog::read_folder(&p.join(sog::META_FILE))?)),
+    },
+    Layout {
+        name: "a result of another method (of SAGA, LUDVIG, LangSplat and others)",
+        is_of_photos: false,
+        is: |p| results::sniff(p).is_some(),
+        open: |p| {
+            let gaussians = results::sniff(p).map_or_else(|| p.into(), |found| found.gaussians);
+            let is_splat = gaussians.extension().is_some_and(|e| e == "ply");
+            Ok(Opened::Cloud(if is_splat { splat_ply::read(&gaussians)? } else { trainings::open(&gaussians)?.cloud }))
+        },
     },
 ];
 

@@ -48,7 +48,30 @@ pub const OPEN_CLIP: &str = "clip-vit-b16";
 /// OpenAI's CLIP ViT-B/32, by its name in the list of models.
 pub const CLIP_B32: &str = "clip-vit-b32";
 
+/// Kind of what a method adds to the Gaussians.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum MethodKind {
+    /// Classes of a classifier.
+    Classes,
+    /// Groups of Gaussians with an embedding each.
+    Clusters,
+    /// Features that are alike where Gaussians belong together.
+    Affinities,
+    /// Embeddings of Gaussians.
+    Embeddings,
+}
+
 impl Method {
+    /// Kind of what it adds to the Gaussians.
+    pub fn kind(self) -> MethodKind {
+        match self {
+            Self::GaussianGrouping => MethodKind::Classes,
+            Self::OpenGaussian | Self::Thgs => MethodKind::Clusters,
+            Self::OmniSeg3d | Self::Saga => MethodKind::Affinities,
+            _ => MethodKind::Embeddings,
+        }
+    }
+
     /// Its name as its authors write it.
     pub fn name(self) -> &'static str {
         match self {

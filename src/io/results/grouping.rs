@@ -1,7 +1,7 @@
 //! Gaussian Grouping, Gaga and OmniSeg3D-GS: `point_cloud.ply` with `obj_dc_0..15`, and the first two with
 //! `classifier.pth` beside it.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use super::face::{Classifier, LevelValues, Method, MethodResult};
 use super::folder::ResultOptions;
@@ -18,7 +18,7 @@ pub(super) fn read(splat: &Path, options: &ResultOptions) -> Result<MethodResult
     let mut cloud = splat_ply::read(splat)?;
     let names: Vec<String> = (0..rows::count(&cloud, PREFIX)).map(|k| format!("{PREFIX}{k}")).collect();
     let features = rows::take(&mut cloud, &names, splat)?;
-    let beside = files::folder_of(splat).join(CLASSIFIER);
+    let beside = classifier_beside(splat);
     let Some(file) = options.decoder.clone().or_else(|| beside.is_file().then_some(beside)) else {
         let level = ("features".to_owned(), LevelValues::Affinity { features, gate: None });
         return MethodResult::of_one_cloud(Method::OmniSeg3d, splat, cloud, vec![level]);
@@ -26,6 +26,15 @@ pub(super) fn read(splat: &Path, options: &ResultOptions) -> Result<MethodResult
     let classifier = classifier(&file, features.dim())?;
     let level = ("classes".to_owned(), LevelValues::Classes { features, classifier });
     MethodResult::of_one_cloud(Method::GaussianGrouping, splat, cloud, vec![level])
+}
+
+fn classifier_beside(splat: &Path) -> PathBuf {
+    files::folder_of(splat).join(CLASSIFIER)
+}
+
+/// Returns whether a splat has its classifier beside it.
+pub(super) fn has_classes(splat: &Path) -> bool {
+    classifier_beside(splat).is_file()
 }
 
 fn classifier(file: &Path, dim: usize) -> Result<Classifier, IoError> {

@@ -61,6 +61,14 @@ fn method(tensors: &Tensors<'_>, file: &Path) -> Result<Method, IoError> {
     }
 }
 
+/// Returns the method that wrote a checkpoint.
+///
+/// # Errors
+/// As [`method()`], and if it is broken.
+pub(super) fn method_of(file: &Path) -> Result<Method, IoError> {
+    method(&Tensors::open(file)?, file)
+}
+
 /// Reads the levels of a result.
 pub(super) fn read(runs: &LevelRuns, options: &ResultOptions) -> Result<MethodResult, IoError> {
     let mut kind = None;

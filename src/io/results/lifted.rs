@@ -8,7 +8,7 @@ use super::face::{EmbeddedLevel, LevelCodes, LevelValues, Method, MethodResult};
 use super::numpy;
 use super::rows::FeatureRows;
 use super::tensors::Tensors;
-use crate::io::{IoError, files, splat_ply};
+use crate::io::{IoError, files, splat_ply, trainings};
 use crate::scene::GaussianCloud;
 
 /// LUDVIG's files.
@@ -19,9 +19,14 @@ pub(super) const DISTILLED: &str = "_features.pt";
 /// Numbers of an OpenCLIP embedding.
 const CLIP: usize = 512;
 
+/// Place of LUDVIG's Gaussians.
+pub(super) fn gaussians_of(file: &Path) -> PathBuf {
+    files::folder_of(file).join(GAUSSIANS)
+}
+
 /// Reads LUDVIG's result.
 pub(super) fn ludvig(file: &Path) -> Result<MethodResult, IoError> {
-    let splat = files::folder_of(file).join(GAUSSIANS);
+    let splat = gaussians_of(file);
     let features = numpy::read(file)?.rows(file, "features")?;
     if features.dim() != CLIP {
         let what = format!(
@@ -47,10 +52,12 @@ pub(super) fn distilled(file: &Path) -> Result<MethodResult, IoError> {
     }
     let splat = splat_of(file).ok_or_else(|| IoError::Unsupported {
         path: file.into(),
-        what: "features of Gaussians, whose .ply was not found".into(),
-        remedy: "export the checkpoint as .ply and put it beside the features, with the same name",
+        what: "features of Gaussians, whose checkpoint was not found".into(),
+        remedy: "put the checkpoint, or its .ply, beside the features, with the same name",
     })?;
-    assembled(Method::SplatDistiller, &splat, splat_ply::read(&splat)?, features)
+    let is_splat = splat.extension().is_some_and(|e| e == "ply");
+    let cloud = if is_splat { splat_ply::read(&splat)? } else { trainings::open(&splat)?.cloud };
+    assembled(Method::SplatDistiller, &splat, cloud, features)
 }
 
 fn assembled(method: Method, splat: &Path, cloud: GaussianCloud, rows: FeatureRows) -> Result<MethodResult, IoError> {
@@ -59,12 +66,13 @@ fn assembled(method: Method, splat: &Path, cloud: GaussianCloud, rows: FeatureRo
     MethodResult::of_one_cloud(method, splat, cloud, vec![("features".into(), LevelValues::Embedded(level))])
 }
 
-/// The splat that the features were made for.
-fn splat_of(file: &Path) -> Option<PathBuf> {
+/// The splat or checkpoint that the features were made for.
+pub(super) fn splat_of(file: &Path) -> Option<PathBuf> {
     let name = file.file_name()?.to_string_lossy();
     let mut stem = name.strip_suffix(DISTILLED)?;
     for end in ["_refined", "_filtered"] {
         stem = stem.strip_suffix(end).unwrap_or(stem);
     }
-    Some(files::folder_of(file).join(format!("{stem}.ply"))).filter(|splat| splat.is_file())
+    let beside = |ending| files::folder_of(file).join(format!("{stem}.{ending}"));
+    ["ply", "pt"].into_iter().map(beside).find(|splat| splat.is_file())
 }

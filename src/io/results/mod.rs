@@ -21,6 +21,7 @@ mod open_gaussian;
 mod product;
 mod rows;
 mod saga;
+mod sniff;
 mod sparse;
 mod tensors;
 mod thgs;
@@ -30,11 +31,13 @@ pub(crate) mod tests;
 
 pub use decoder::{Decoder, DecoderStep, LinearLayer};
 pub use face::{
-    CLIP_B32, Classifier, ClusterLevel, EmbeddedLevel, Leaves, LevelCodes, LevelValues, Method, MethodResult,
-    OPEN_CLIP, ResultLevel, ScaleGate,
+    CLIP_B32, Classifier, ClusterLevel, EmbeddedLevel, Leaves, LevelCodes, LevelValues, Method, MethodKind,
+    MethodResult, OPEN_CLIP, ResultLevel, ScaleGate,
 };
 pub use folder::ResultOptions;
 pub use open::open_result;
 pub use product::ProductCodes;
 pub use rows::FeatureRows;
+pub use saga::saved_selections;
+pub use sniff::{SniffedResult, is_feature, sniff};
 pub use sparse::SparseRows;

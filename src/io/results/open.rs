@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use super::face::MethodResult;
 use super::folder::{self, ResultOptions};
+use super::level_runs::LevelRuns;
 use super::{feature_3dgs, grouping, langsplat, legaussians, level_runs, lifted, open_gaussian, saga, thgs};
 use crate::io::ply::Ply;
 use crate::io::{IoError, files};
@@ -11,7 +12,31 @@ use crate::io::{IoError, files};
 /// Most bytes of a splat's header.
 const HEADER_BYTES: u64 = 64 << 10;
 
-type Reader = fn(&Path, &ResultOptions) -> Result<MethodResult, IoError>;
+/// Place of a result of another method, by the files that it consists of.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) enum ResultPlace {
+    /// THGS's hierarchy.
+    Thgs(PathBuf),
+    /// SAGA's features.
+    Saga(PathBuf),
+    /// A splat with the features of a method as properties.
+    Splat(PathBuf, SplatFeatures),
+    /// Checkpoints of levels.
+    Levels(LevelRuns),
+    /// LUDVIG's features.
+    Ludvig(PathBuf),
+    /// splat-distiller's features.
+    Distilled(PathBuf),
+}
+
+/// Features in the properties of a splat.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum SplatFeatures {
+    Grouping,
+    OpenGaussian,
+    Feature3dgs,
+    LeGaussians,
+}
 
 /// Opens the result of another method: its folder, or one of its files.
 ///
@@ -26,32 +51,55 @@ pub fn open_result(path: &Path, options: &ResultOptions) -> Result<MethodResult,
         let cause = std::io::ErrorKind::NotFound.into();
         return Err(IoError::Read { path: path.into(), cause });
     }
+    match place(path)? {
+        Some(ResultPlace::Thgs(file)) => thgs::read(&file),
+        Some(ResultPlace::Saga(file)) => saga::read(&file),
+        Some(ResultPlace::Splat(splat, features)) => match features {
+            SplatFeatures::Grouping => grouping::read(&splat, options),
+            SplatFeatures::OpenGaussian => open_gaussian::read(&splat, options),
+            SplatFeatures::Feature3dgs => feature_3dgs::read(&splat, options),
+            SplatFeatures::LeGaussians => legaussians::read(&splat, options),
+        },
+        Some(ResultPlace::Levels(runs)) => langsplat::read(&runs, options),
+        Some(ResultPlace::Ludvig(file)) => lifted::ludvig(&file),
+        Some(ResultPlace::Distilled(file)) => lifted::distilled(&file),
+        None => Err(IoError::Unsupported {
+            path: path.into(),
+            what: "files of no method that is known".into(),
+            remedy: "known are Gaussian Grouping, Gaga, OmniSeg3D-GS, OpenGaussian, Feature 3DGS, SAGA, LEGaussians, \
+                     LangSplat, LangSplatV2, Occam's LGS, Dr.Splat, THGS, ReLaGS, splat-distiller and LUDVIG",
+        }),
+    }
+}
+
+/// Finds the files of a result; `None` if there are none.
+///
+/// # Errors
+/// If a splat's header is broken, or the levels of several results are there.
+pub(super) fn place(path: &Path) -> Result<Option<ResultPlace>, IoError> {
     if let Some(file) = named(path, |name| name == thgs::FILE) {
-        return thgs::read(&file);
+        return Ok(Some(ResultPlace::Thgs(file)));
     }
     if let Some(file) = features_of_saga(path) {
-        return saga::read(&file);
+        return Ok(Some(ResultPlace::Saga(file)));
     }
     if let Some(splat) = splat_of(path)
-        && let Some(read) = reader_of(&splat)?
+        && let Some(features) = features_of(&splat)?
     {
-        return read(&splat, options);
+        return Ok(Some(ResultPlace::Splat(splat, features)));
+    }
+    if path.is_file() && is_splat(path) {
+        return Ok(None);
     }
     if let Some(runs) = level_runs::find(path)? {
-        return langsplat::read(&runs, options);
+        return Ok(Some(ResultPlace::Levels(runs)));
     }
     if let Some(file) = named(path, |name| name == lifted::FEATURES) {
-        return lifted::ludvig(&file);
+        return Ok(Some(ResultPlace::Ludvig(file)));
     }
-    if let Some(file) = named(path, |name| name.ends_with(lifted::DISTILLED)) {
-        return lifted::distilled(&file);
-    }
-    Err(IoError::Unsupported {
-        path: path.into(),
-        what: "files of no method that is known".into(),
-        remedy: "known are Gaussian Grouping, Gaga, OmniSeg3D-GS, OpenGaussian, Feature 3DGS, SAGA, LEGaussians, \
-                 LangSplat, LangSplatV2, Occam's LGS, Dr.Splat, THGS, ReLaGS, splat-distiller and LUDVIG",
-    })
+    let is = |name: &str| name.ends_with(lifted::DISTILLED);
+    let distilled = named(path, is).or_else(|| named(&path.join("ckpts"), is));
+    Ok(distilled.map(ResultPlace::Distilled))
 }
 
 /// The file itself, or the first in the folder, whose name `is` accepts.
@@ -78,29 +126,32 @@ fn features_of_saga(path: &Path) -> Option<PathBuf> {
 /// The splat that a path means.
 fn splat_of(path: &Path) -> Option<PathBuf> {
     const SPLAT: &str = "point_cloud.ply";
-    let is_splat = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("ply"));
     match path.is_dir() {
         true => folder::latest(path, SPLAT),
-        false if is_splat => Some(path.to_owned()),
+        false if is_splat(path) => Some(path.to_owned()),
         false => folder::latest(files::folder_of(path), SPLAT),
     }
 }
 
-/// The reader of a splat with these properties.
-fn reader_of(splat: &Path) -> Result<Option<Reader>, IoError> {
+fn is_splat(path: &Path) -> bool {
+    path.extension().is_some_and(|e| e.eq_ignore_ascii_case("ply"))
+}
+
+/// The features among the properties of a splat.
+fn features_of(splat: &Path) -> Result<Option<SplatFeatures>, IoError> {
     let start = files::read_start(splat, HEADER_BYTES)?;
     let ply = Ply::parse(&start, splat)?;
     let Some(vertex) = ply.element("vertex") else { return Ok(None) };
     let has = |name: &str| vertex.properties.iter().any(|p| p.name == name);
     let first = |prefix: &str| has(&format!("{prefix}0"));
     Ok(if first(grouping::PREFIX) {
-        Some(grouping::read)
+        Some(SplatFeatures::Grouping)
     } else if has(open_gaussian::PROPERTY) {
-        Some(open_gaussian::read)
+        Some(SplatFeatures::OpenGaussian)
     } else if first(feature_3dgs::PREFIX) {
-        Some(feature_3dgs::read)
+        Some(SplatFeatures::Feature3dgs)
     } else if first(legaussians::PREFIX) {
-        Some(legaussians::read)
+        Some(SplatFeatures::LeGaussians)
     } else {
         None
     })

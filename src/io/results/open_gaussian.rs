@@ -12,7 +12,10 @@ use crate::io::{IoError, files, splat_ply};
 
 /// First of the properties.
 pub(super) const PROPERTY: &str = "ins_feat_r";
-const CLUSTERS: &str = "cluster_lang.npz";
+/// Start of the properties' names.
+pub(super) const PREFIX: &str = "ins_feat_";
+/// File of the clusters.
+pub(super) const CLUSTERS: &str = "cluster_lang.npz";
 /// Clusters seen in fewer photos than this have no embedding.
 const LEAST_SEEN: f32 = 5.0;
 /// Large clusters of the published settings.
@@ -21,7 +24,7 @@ const USUAL_ROOTS: usize = 64;
 /// Reads a result; `splat` has the properties.
 pub(super) fn read(splat: &Path, options: &ResultOptions) -> Result<MethodResult, IoError> {
     let mut cloud = splat_ply::read(splat)?;
-    let unwanted = |name: &str| name.starts_with("ins_feat_") || ["red", "green", "blue"].contains(&name);
+    let unwanted = |name: &str| name.starts_with(PREFIX) || ["red", "green", "blue"].contains(&name);
     rows::drop_extras(&mut cloud, |e| unwanted(&e.name));
     let run = folder::run_of(splat);
     let beside = run.join(CLUSTERS);

@@ -37,7 +37,40 @@ pub(super) fn read(file: &Path) -> Result<MethodResult, IoError> {
     MethodResult::of_one_cloud(Method::Saga, &splat, cloud, vec![("affinities".into(), level)])
 }
 
-fn splat_of(file: &Path) -> Option<PathBuf> {
+/// Folder of saved selections.
+const SELECTIONS: &str = "segmentation_res";
+/// Folders above the run in which selections are looked for: SAGA writes them where it is started.
+const ABOVE: usize = 2;
+
+/// Reads the selections that were saved beside a result, with their names and the numbers of their Gaussians. Those of
+/// other results have another number of values, and are passed over.
+///
+/// # Errors
+/// If one is broken.
+pub fn saved_selections(result: &MethodResult) -> Result<Vec<(String, Vec<u32>)>, IoError> {
+    let run = folder::run_of(&result.path);
+    let Some(folder) = run.ancestors().take(1 + ABOVE).map(|a| a.join(SELECTIONS)).find(|f| f.is_dir()) else {
+        return Ok(Vec::new());
+    };
+    let mut names = files::names_in(&folder).unwrap_or_default();
+    names.retain(|name| name.ends_with(".pt"));
+    names.sort();
+    let mut all = Vec::new();
+    for name in &names {
+        let file = folder.join(name);
+        let mut tensors = Tensors::open(&file)?;
+        let Some(tensor) = tensors.names().next().map(str::to_owned) else { continue };
+        if tensors.is_float(&tensor) || tensors.shape(&tensor) != Some(&[result.cloud.len()]) {
+            continue;
+        }
+        let chosen = (0..).zip(tensors.integers(&tensor)?).filter(|(_, v)| *v != 0).map(|(i, _)| i).collect();
+        all.push((name.trim_end_matches(".pt").to_owned(), chosen));
+    }
+    Ok(all)
+}
+
+/// Finds the Gaussians with their colors.
+pub(super) fn splat_of(file: &Path) -> Option<PathBuf> {
     let run = folder::run_of(file);
     let names = ["scene_point_cloud.ply", "point_cloud.ply"];
     names.iter().find_map(|name| folder::latest(&run, name).or_else(|| folder::latest(files::folder_of(file), name)))

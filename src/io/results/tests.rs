@@ -242,7 +242,7 @@ fn what_cannot_be_opened_exactly_is_refused_with_the_reason() {
 }
 
 /// Copies a folder.
-fn copied(from: &Path, to: &Path) {
+pub(crate) fn copied(from: &Path, to: &Path) {
     std::fs::create_dir_all(to).expect("created");
     for entry in std::fs::read_dir(from).expect("listed") {
         let entry = entry.expect("an entry");

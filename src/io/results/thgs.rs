@@ -33,7 +33,8 @@ pub(super) fn read(file: &Path) -> Result<MethodResult, IoError> {
     MethodResult::of_one_cloud(Method::Thgs, &splat, cloud, levels)
 }
 
-fn splat_of(file: &Path) -> Option<PathBuf> {
+/// Finds the Gaussians of a hierarchy.
+pub(super) fn splat_of(file: &Path) -> Option<PathBuf> {
     let whole = std::path::absolute(file).unwrap_or_else(|_| file.into());
     let mut folders = whole.ancestors().skip(1).take(2);
     folders.find_map(|folder| folder::latest(folder, "point_cloud.ply"))

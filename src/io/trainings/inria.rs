@@ -43,7 +43,7 @@ pub(super) fn open(path: &Path) -> Result<Training, IoError> {
     let mut cloud = parameters::read(path, &mut file, &names, ColorMeaning::Harmonics)?;
     // Bands that the training had not turned on yet are zero, and stay so.
     if file.tree.length("0") != Some(LEAST) {
-        cloud.warnings.push("the checkpoint has more than Gaussians; its further values are not shown".into());
+        cloud.warnings.push(super::MORE_VALUES.into());
     }
     let mut beside = beside.unwrap_or_else(|| GsOutput::of(files::folder_of(path)));
     beside.name = Some(files::folder_name(&beside.folder));

@@ -30,6 +30,9 @@ pub(crate) struct Training {
     pub(crate) beside: GsOutput,
 }
 
+/// Warning about a checkpoint with more values than those of Gaussians.
+pub(crate) const MORE_VALUES: &str = "the checkpoint has more than Gaussians; its further values are not shown";
+
 /// Returns whether a folder, or the file of settings in one, is a training whose Gaussians are in checkpoints.
 pub(crate) fn is_training(path: &Path) -> bool {
     inria::newest_checkpoint(path).is_some() || gsplat::is_run(path) || nerfstudio::run_of(path).is_some()

@@ -2,12 +2,16 @@
 //! photos if they still exist.
 
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
+use super::tolerant::photos_of;
 use super::{OpenedScene, Scene};
 use crate::io::gs_output::{self, GsOutput};
 use crate::io::photo_source::PhotoSource;
+use crate::io::results::MethodKind;
 use crate::io::scene_files::{SELECTION_FILE, is_scene};
 use crate::io::trained::SceneCamera;
+use crate::pipeline::observer::{Observer, Severity};
 use crate::scene::{Dataset, Photo};
 
 impl OpenedScene {
@@ -49,8 +53,23 @@ pub(super) fn add_to(scene: &mut Scene, training: Option<GsOutput>) {
     }
 }
 
+/// Opens Gaussians of another program, with their photos or cameras if there are any.
+pub(super) fn with_photos(scene: Scene, observer: &mut dyn Observer) -> OpenedScene {
+    if let Some(method) = scene.method {
+        let so = match method.kind() {
+            MethodKind::Classes | MethodKind::Clusters => "its groups of Gaussians are objects",
+            MethodKind::Affinities => "'fmlgs import' finds its objects",
+            MethodKind::Embeddings => "'fmlgs query' asks its embeddings",
+        };
+        observer.note(Severity::Info, format!("{} is a result of {}: {so}", scene.name, method.name()));
+    }
+    let seen = scene.dataset_path.is_some().then(|| photos_of(&scene, observer)).flatten();
+    let dataset = seen.or_else(|| photos_unseen(&scene)).map(Arc::new);
+    OpenedScene::of(scene, dataset, observer)
+}
+
 /// Returns the cameras beside a scene as photos without files, if there are any.
-pub(super) fn photos_unseen(scene: &Scene) -> Option<Dataset> {
+fn photos_unseen(scene: &Scene) -> Option<Dataset> {
     let root = scene.cameras_from.clone()?;
     let photo = |c: &SceneCamera| Photo::new(&*c.name, PathBuf::new(), c.camera.clone());
     let photos: Vec<Photo> = scene.cameras.iter().map(photo).collect();

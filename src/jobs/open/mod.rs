@@ -10,21 +10,24 @@ use super::sparse_cloud::sparse_cloud;
 use super::{Folders, JobError, measurements, plan};
 use crate::io::gs_output::GsOutput;
 use crate::io::labels::Labels;
+use crate::io::results::{Method, MethodResult};
 use crate::io::scene_files::CHECKPOINT_FILE;
 use crate::io::trained::{self, History, SceneCamera};
 use crate::io::{self, Opened, TrainedScene};
 use crate::pipeline::observer::{Observer, Severity};
+use crate::pipeline::semantics::query::foreign::identities::{USUAL_SCALE, semantic_map};
 use crate::pipeline::train::TrainConfig;
 use crate::render::RenderSettings;
 use crate::scene::measurement::Measurement;
-use crate::scene::plan::used_degree;
-use crate::scene::resource_log::{self, ResourceKind};
-use crate::scene::{Axes, Bounds, Camera, Dataset, GaussianCloud, HomeView, Machine, SceneFacts, SemanticMap};
+use crate::scene::{Axes, Camera, Dataset, GaussianCloud, HomeView, Machine, SceneFacts, SemanticMap};
 
 mod beside;
+mod drawn;
+mod method;
 mod received;
 mod tolerant;
 
+use drawn::{compact, near_without_cameras};
 pub use received::Origin;
 pub(crate) use received::received;
 pub(crate) use tolerant::known_objects;
@@ -63,6 +66,10 @@ pub struct Scene {
     pub(crate) warnings: Vec<String>,
     /// True if its Gaussians were edited since training.
     pub(crate) edited: bool,
+    /// Method that made it, if it is a result of another one.
+    pub(crate) method: Option<Method>,
+    /// Classes or clusters of such a result, with the same Gaussians.
+    pub(crate) result: Option<Arc<MethodResult>>,
 }
 
 impl Scene {
@@ -88,17 +95,21 @@ impl Scene {
 
     /// Loads its objects and parts.
     pub fn semantics(&self) -> Result<SemanticMap, JobError> {
-        let map = match &self.folder {
-            Some(folder) => io::semantic_map::load(folder, self.state.as_deref(), &self.cloud)?,
-            None => None,
+        let map = match (&self.folder, &self.result) {
+            (Some(folder), _) => io::semantic_map::load(folder, self.state.as_deref(), &self.cloud)?,
+            (None, Some(result)) => Some(semantic_map(result, USUAL_SCALE)?),
+            (None, None) => None,
         };
-        map.ok_or_else(|| JobError::NoObjects(self.path.clone()))
+        map.ok_or_else(|| match self.method.filter(|_| self.folder.is_none()) {
+            Some(method) => JobError::NotGrouped { path: self.path.clone(), method },
+            None => JobError::NoObjects(self.path.clone()),
+        })
     }
 
     /// Loads its objects and parts, if there are any.
     pub(crate) fn known_semantics(&self) -> Result<Option<SemanticMap>, JobError> {
         match self.semantics() {
-            Err(JobError::NoObjects(_)) => Ok(None),
+            Err(JobError::NoObjects(_) | JobError::NotGrouped { .. }) => Ok(None),
             map => map.map(Some),
         }
     }
@@ -166,6 +177,9 @@ pub(crate) enum Contents {
 
 /// Reads the contents of `path`; a splat with these axes, if given.
 pub(crate) fn contents(path: &Path, axes: Option<Axes>) -> Result<Contents, JobError> {
+    if let Some(scene) = method::scene(path, axes)? {
+        return Ok(Contents::Scene(scene));
+    }
     let path = &*beside::splat_of(path);
     let (opened, training) = io::open_beside(path, axes)?;
     Ok(match opened {
@@ -284,7 +298,8 @@ impl OpenedScene {
             _ => scene.home(),
         };
         let has_checkpoint = scene.folder.as_ref().is_some_and(|f| f.join(CHECKPOINT_FILE).is_file());
-        let semantics = scene.folder.is_some().then(|| known_objects(&scene, observer)).flatten();
+        let may_have = scene.folder.is_some() || scene.result.is_some();
+        let semantics = may_have.then(|| known_objects(&scene, observer)).flatten();
         Self {
             dataset,
             known_held_out,
@@ -308,26 +323,25 @@ pub(crate) fn open(
     machine: &Machine,
     observer: &mut dyn Observer,
 ) -> Result<OpenedScene, JobError> {
-    let path = &beside::splat_of(&std::path::absolute(path).unwrap_or_else(|_| path.to_path_buf()));
+    let path = std::path::absolute(path).unwrap_or_else(|_| path.to_path_buf());
+    let of_method = method::scene(&path, None)?;
+    let path = &if of_method.is_some() { path } else { beside::splat_of(&path) };
     let mut at = path.clone();
-    let (found, training) = io::open_beside(path, None)?;
-    let mut opened = match found {
-        Opened::Dataset(dataset) => photos(named(dataset, folders), folders, observer),
-        Opened::Cloud(cloud) => {
-            let scene = Scene::bare(path, cloud, training);
-            let seen = scene.dataset_path.is_some().then(|| photos_of(&scene, observer)).flatten();
-            let dataset = seen.or_else(|| beside::photos_unseen(&scene)).map(Arc::new);
-            OpenedScene::of(scene, dataset, observer)
-        }
-        Opened::Trained(trained) => {
-            let scene = tolerant(path, trained, observer);
-            let dataset = photos_of(&scene, observer).map(|dataset| Arc::new(named(dataset, folders)));
-            if let Some(dataset) = dataset.as_ref().filter(|_| folders.is_training(path)) {
-                // One of several training runs of these photos, by which the user knows it.
-                at = dataset.source().to_path_buf();
+    let mut opened = match of_method {
+        Some(scene) => beside::with_photos(scene, observer),
+        None => match io::open_beside(path, None)? {
+            (Opened::Dataset(dataset), _) => photos(named(dataset, folders), folders, observer),
+            (Opened::Cloud(cloud), training) => beside::with_photos(Scene::bare(path, cloud, training), observer),
+            (Opened::Trained(trained), _) => {
+                let scene = tolerant(path, trained, observer);
+                let dataset = photos_of(&scene, observer).map(|dataset| Arc::new(named(dataset, folders)));
+                if let Some(dataset) = dataset.as_ref().filter(|_| folders.is_training(path)) {
+                    // One of several training runs of these photos, by which the user knows it.
+                    at = dataset.source().to_path_buf();
+                }
+                OpenedScene::of(scene, dataset, observer)
             }
-            OpenedScene::of(scene, dataset, observer)
-        }
+        },
     };
     opened.scene.path = at;
     opened.runs = opened.dataset.as_ref().map_or_else(Vec::new, |d| runs::list(folders, d.source()));
@@ -373,27 +387,4 @@ fn photos(dataset: Dataset, folders: &Folders, observer: &mut dyn Observer) -> O
     let home = HomeView::new(&dataset.cameras(), cloud.as_deref());
     let scene = Scene { name, cloud: cloud.unwrap_or_default(), settings, ..Scene::default() };
     OpenedScene { scene, dataset: Some(dataset), out, home, ..OpenedScene::default() }
-}
-
-/// Returns the near plane's distance for Gaussians without cameras. Small scenes would lie before the default one; in
-/// large ones, near things may be visible, too.
-fn near_without_cameras(cloud: &GaussianCloud) -> f64 {
-    let usual = RenderSettings::default().near;
-    let bounds = Bounds::robust((0..cloud.len()).map(|i| cloud.world_position(i)));
-    let near = bounds.map_or(0.0, |b| Camera::near_plane(b.radius()));
-    if near > 0.0 { usual.min(near) } else { usual }
-}
-
-/// Drops zero bands of spherical harmonics; returns the degree in the file, too.
-fn compact(cloud: GaussianCloud) -> (Arc<GaussianCloud>, u8) {
-    let stored = cloud.sh_degree;
-    let used = used_degree(&cloud);
-    let cloud = cloud.up_to_degree(used);
-    resource_log::record(
-        ResourceKind::Gaussians,
-        crate::math::format::things(cloud.len(), "Gaussian"),
-        "the scene was opened",
-        cloud.bytes(),
-    );
-    (Arc::new(cloud), stored)
 }

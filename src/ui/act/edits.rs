@@ -68,6 +68,10 @@ fn start_edit(app: &mut App, request: EditRequest, also: Option<PathBuf>, editin
     if remote::takes_edit(app, &request) {
         return false;
     }
+    // An opened result of another method keeps its files: the first edit makes a scene of it.
+    if scene.method.is_some() && !scene.is_stored() && map.is_some() {
+        return start_rearrangement(app, SplatChange::Objects(request), editing);
+    }
     let map = map.map_or_else(|| Arc::new(empty_map(&cloud)), |map| Arc::clone(&map));
     let (cloud, out, workspace) = (Arc::clone(&cloud), scene.out.clone(), Arc::clone(&app.workspace));
     let change = move |observer: &mut dyn Observer| {

@@ -21,9 +21,9 @@ use crate::ui::state::{ShownReport, Tone};
 use crate::worker::{Failure, JobInfo, Makes};
 
 /// File endings of scenes.
-const SCENES: [&str; 17] = [
+const SCENES: [&str; 18] = [
     ".ply", ".splat", ".ksplat", ".spz", ".sog", ".gltf", ".glb", ".json", ".toml", ".npy", ".bin", ".txt", ".zip",
-    ".pth", ".pt", ".ckpt", ".yml",
+    ".pth", ".pt", ".ckpt", ".yml", ".npz",
 ];
 
 pub(in crate::ui) fn choose_folder(app: &mut App) {

@@ -19,6 +19,7 @@ mod queries;
 mod rearranging;
 mod removing;
 mod report;
+mod results;
 mod runs;
 mod selecting;
 mod shapes;

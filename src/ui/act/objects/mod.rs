@@ -238,7 +238,8 @@ pub(in crate::ui) fn remove(app: &mut App, ids: &[IdentityId]) {
     {
         return;
     }
-    let Some(folder) = app.state.scene.as_ref().filter(|_| app.state.is_trained()).map(|s| s.out.clone()) else {
+    let Some(folder) = app.state.scene.as_ref().filter(|_| app.state.is_trained()).map(|s| s.stored().to_path_buf())
+    else {
         return app.state.toast(Tone::Warning, "Only from a trained scene can something be removed.");
     };
     submit_removal(app, RemoveRequest { folder, options: RemovalOptions::of(ids), retrain: false });
@@ -249,7 +250,7 @@ pub(in crate::ui) fn submit_removal(app: &mut App, request: RemoveRequest) {
     if app.is_editing() {
         return app.state.toast(Tone::Warning, "Objects are being changed; remove it once that is done.");
     }
-    if app.state.scene.as_ref().is_none_or(|s| s.out != request.folder) {
+    if app.state.scene.as_ref().is_none_or(|s| s.stored() != request.folder) {
         let text = "Another scene is open now; open that one first to remove from it.";
         return app.state.toast(Tone::Warning, text);
     }

@@ -1,0 +1,129 @@
+//! The real binary on results of other methods: they are described, asked, imported, and edited from then on.
+
+use std::path::{Path, PathBuf};
+
+use crate::agent_commands::stored::stored;
+use crate::cli_support::{Done, command, copy, fmlgs, folder};
+
+/// A small result in the exact format of its method.
+fn sample(name: &str) -> String {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/results").join(name);
+    path.to_str().expect("UTF-8").to_owned()
+}
+
+/// All files of a folder with their contents.
+fn files(folder: &Path) -> Vec<(PathBuf, Vec<u8>)> {
+    let mut all = Vec::new();
+    for entry in std::fs::read_dir(folder).expect("a folder") {
+        let path = entry.expect("an entry").path();
+        match path.is_dir() {
+            true => all.extend(files(&path)),
+            false => all.push((path.clone(), std::fs::read(&path).expect("readable"))),
+        }
+    }
+    all.sort();
+    all
+}
+
+#[test]
+fn a_result_of_gaussian_grouping_becomes_a_scene_that_is_asked_and_edited() {
+    let folder = folder();
+    let at = |name: &str| folder.path().join(name).to_str().expect("UTF-8").to_owned();
+    let (run, scene) = (folder.path().join("run"), at("scene"));
+    copy(Path::new(&sample("gaussian_grouping")), &run);
+    let before = files(&run);
+    let run_text = run.to_str().expect("UTF-8");
+
+    let info = fmlgs(&["info", run_text, "--json"]).ok().json();
+    assert_eq!((&info["kind"], &info["result"]["method"]), (&"result".into(), &"Gaussian Grouping".into()));
+    assert_eq!((&info["gaussians"], info["cameras"].as_array().expect("cameras").len()), (&32.into(), 2));
+    let told = fmlgs(&["info", run_text]).ok().stdout;
+    assert!(told.contains("256 classes") && told.contains("does not answer  phrases"), "{told}");
+
+    let done = fmlgs(&["import", run_text, "--out", &scene, "--json"]).ok().json();
+    let counts = ["gaussians", "objects", "parts", "cameras"].map(|key| done[key].as_u64().expect("a number"));
+    assert_eq!((counts, &done["method"]), ([32, 3, 0, 2], &"Gaussian Grouping".into()));
+    let info = fmlgs(&["info", &scene, "--json"]).ok().json();
+    assert_eq!((&info["kind"], &info["identities"]), (&"trained".into(), &3.into()));
+    let names = || {
+        let all = stored(Path::new(&scene));
+        (1..4).map(|id| all.name(id)).collect::<Vec<_>>()
+    };
+    assert_eq!(names(), ["class 3", "class 7", "class 200"]);
+
+    // Asked by name, renamed, asked again.
+    let pixels =
+        |text: &str| fmlgs(&["query", &scene, text, "--json"]).ok().json()["pixels"].as_u64().expect("a number");
+    assert!(pixels("class 7") > 0);
+    fmlgs(&["query", &scene, "giraffe"]).fails_with(1);
+    fmlgs(&["agent", &scene, "rename class 7 to kettle", "yes"]).ok();
+    assert_eq!(names(), ["class 3", "kettle", "class 200"]);
+    assert!(pixels("kettle") > 0);
+
+    // Removed and exported, each into its own place.
+    let left = fmlgs(&["remove", &scene, "kettle", "--fill", "none", "--out", &at("without"), "--json"]).ok().json();
+    assert!(left["gaussians"].as_u64().is_some_and(|n| (1..=24).contains(&n)), "{left}");
+    fmlgs(&["segment", &scene, "kettle", "--out", &at("kettle.ply")]).ok();
+    let kettle = fmlgs(&["info", &at("kettle.ply"), "--json"]).ok().json();
+    assert_eq!((&kettle["kind"], &kettle["gaussians"]), (&"splat".into(), &8.into()));
+    fmlgs(&["export", &scene, "--out", &at("all.ply"), "--no-measure"]).ok();
+    assert_eq!(fmlgs(&["info", &at("all.ply"), "--json"]).ok().json()["gaussians"], 32);
+    assert!(files(&run) == before, "the result stays as it is");
+
+    // Once more, onto the scene: refused, and nothing changes.
+    let kept = files(Path::new(&scene));
+    let refused = fmlgs(&["import", run_text, "--out", &scene]).fails_with(1).stderr;
+    assert!(refused.contains("holds something already"), "{refused}");
+    let refused = fmlgs(&["import", run_text, "--out", run_text]).fails_with(1).stderr;
+    assert!(refused.contains("holds something already"), "{refused}");
+    assert!(files(Path::new(&scene)) == kept && files(&run) == before);
+}
+
+#[test]
+fn classes_are_objects_without_an_import() {
+    let folder = folder();
+    let at = |name: &str| folder.path().join(name).to_str().expect("UTF-8").to_owned();
+    let run = sample("gaussian_grouping");
+    let answer = fmlgs(&["query", &run, "class 3", "--mask", &at("mask.png"), "--json"]).ok().json();
+    assert!(answer["pixels"].as_u64().is_some_and(|n| n > 0) && Path::new(&at("mask.png")).exists(), "{answer}");
+    fmlgs(&["query", &run, "giraffe"]).fails_with(1);
+    fmlgs(&["remove", &run, "class 3", "--fill", "none", "--out", &at("without")]).ok();
+    let without = fmlgs(&["info", &at("without"), "--json"]).ok().json();
+    assert!(without["kind"] == "trained" && without["gaussians"].as_u64().is_some_and(|n| n < 32), "{without}");
+    fmlgs(&["render", &run, "--camera", "1", "--out", &at("view.png")]).ok();
+}
+
+#[test]
+fn what_a_result_cannot_do_is_said_with_what_can() {
+    let folder = folder();
+    let at = |name: &str| folder.path().join(name).to_str().expect("UTF-8").to_owned();
+    let run = |arguments: &[&str]| -> Done {
+        let mut command = command(arguments);
+        command.env("FMLGS_MODELS", folder.path().join("no-models")).output().expect("runs").into()
+    };
+    let (language, saga) = (sample("langsplat/output"), sample("saga"));
+    // The encoder is not here.
+    let refused = run(&["query", &language, "kettle", "--out", &at("answer")]).fails_with(1).stderr;
+    assert!(refused.contains("clip-vit-b16") && refused.contains("fmlgs models"), "{refused}");
+    assert!(!folder.path().join("answer").exists(), "nothing was written");
+    let refused = run(&["query", &language, "kettle", "--kind", "part"]).fails_with(2).stderr;
+    assert!(refused.contains("--kind has no effect on a result of LangSplat"), "{refused}");
+    let info = run(&["info", &language]).ok().stdout;
+    assert!(info.contains("result of LangSplat") && info.contains("small: codes of 3 numbers"), "{info}");
+    assert!(info.contains("clip-vit-b16"), "{info}");
+
+    let refused = run(&["query", &saga, "kettle"]).fails_with(1).stderr;
+    assert!(refused.contains("SAGA") && refused.contains("fmlgs import"), "{refused}");
+    let refused = run(&["query", &sample("gaussian_grouping"), "class 3", "--level", "1"]).fails_with(2).stderr;
+    assert!(refused.contains("--level"), "{refused}");
+    let refused = run(&["preprocess", &saga]).fails_with(1).stderr;
+    assert!(refused.contains("fmlgs import"), "{refused}");
+
+    let refused = run(&["import", &language, "--out", &at("scene"), "--scale", "0.5"]).fails_with(2).stderr;
+    assert!(refused.contains("--scale has no effect"), "{refused}");
+    assert!(!folder.path().join("scene").exists());
+    let done = run(&["import", &language, "--out", &at("scene")]).ok().stdout;
+    assert!(done.contains("32 Gaussians of LangSplat") && done.contains("fmlgs query"), "{done}");
+    let refused = run(&["import", &at("scene"), "--out", &at("again")]).fails_with(2).stderr;
+    assert!(refused.contains("already") && !folder.path().join("again").exists(), "{refused}");
+}
