@@ -15,6 +15,7 @@ use crate::pipeline::observer::Interrupted;
 use crate::pipeline::removal::RemovalError;
 use crate::pipeline::semantics::lifting::edit::EditError;
 use crate::pipeline::semantics::lifting::error::FindError;
+use crate::pipeline::semantics::query::foreign::ForeignError;
 use crate::pipeline::splat_edit::SplatEditError;
 use crate::pipeline::synth::SynthError;
 use crate::pipeline::train::TrainError;
@@ -57,6 +58,8 @@ pub enum JobError {
     HeldOut(String),
     #[error("{} has no objects yet", .0.display())]
     NoObjects(PathBuf),
+    #[error(transparent)]
+    Foreign(#[from] ForeignError),
     #[error("the query is empty; type an object's name")]
     EmptyQuery,
     #[error("no match for '{0}'")]

@@ -12,8 +12,6 @@ use crate::io::{IoError, files, gs_output, splat_ply};
 
 /// Start of the properties' names.
 pub(super) const PREFIX: &str = "clip_f_indices_";
-/// Folders above the run in which the photos are looked for.
-const ABOVE: usize = 3;
 /// Columns of the codebook that are CLIP's; DINO's follow.
 const CLIP: usize = 512;
 
@@ -62,11 +60,8 @@ fn entries(file: &Path) -> Result<LinearLayer, IoError> {
 }
 
 fn codebook(run: &Path, splat: &Path) -> Option<PathBuf> {
-    let source = gs_output::beside(splat).and_then(|beside| beside.source);
-    // A relative path is relative to where the training was started, which is above the folder of the run.
-    let below_run = source.as_deref().and_then(|s| s.strip_prefix(run).ok());
-    let above = below_run.into_iter().flat_map(|s| run.ancestors().skip(1).take(ABOVE).map(move |above| above.join(s)));
-    let photos = source.iter().cloned().chain(above).flat_map(|s| [s.join("images"), s]);
+    let source = gs_output::beside(splat).and_then(|beside| beside.source).and_then(|source| source.found);
+    let photos = source.into_iter().flat_map(|s| [s.join("images"), s]);
     let folders = std::iter::once(run.to_owned()).chain(photos);
     let is = |name: &String| name.ends_with("_codebook.pt");
     folders.into_iter().find_map(|f| files::names_in(&f).ok()?.into_iter().find(is).map(|name| f.join(name)))

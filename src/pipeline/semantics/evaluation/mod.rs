@@ -5,6 +5,7 @@
 //! [`raw_features`] and [`by_similarity`] are baselines without tracked identities. [`referring`] writes
 //! questions with their truth about scenes of meshes.
 
+pub(crate) mod by_rule;
 pub(crate) mod by_similarity;
 #[cfg(test)]
 mod end_to_end_tests;
