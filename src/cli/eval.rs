@@ -12,6 +12,7 @@ use crate::io::results::ResultOptions;
 use crate::jobs::batch::BatchEvaluation;
 use crate::jobs::compare::protocol::ResultEvaluation;
 use crate::jobs::compare::subject::ComparedScene;
+use crate::jobs::compare::views::WantedViews;
 use crate::jobs::evaluate::{self, EvaluateOptions, PhotoComparison};
 use crate::jobs::evaluate_masks::Protocol;
 use crate::jobs::export;
@@ -116,6 +117,7 @@ impl EvalArgs {
         }
         Ok(ResultEvaluation {
             labels: labels.to_owned(),
+            views: WantedViews::Labeled,
             photos: self.photos.clone(),
             max_side_px: self.max_side,
             protocol: self.protocol,
@@ -146,6 +148,10 @@ pub(crate) fn run(args: EvalArgs, quiet: bool) -> Result<(), CliError> {
         && let Some(result) = args.result()?
     {
         return eval_results::run(result, &args.of_result(labels)?, args.json, quiet);
+    }
+    if args.decoder.is_some() {
+        let text = format!("--decoder has no effect here: '{}' is no result of another method", args.scene.display());
+        return Err(CliError::Usage(text));
     }
     let comparison = args.check()?;
     if let Some(labels) = &args.masks {

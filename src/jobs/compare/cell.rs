@@ -1,4 +1,4 @@
-//! What a comparison says: a cell for each phrase, view and scene, and means of each scene.
+//! Content of a comparison: a cell for each phrase, view and scene, and means of each scene.
 
 use serde::Serialize;
 
@@ -120,7 +120,7 @@ pub(crate) enum ShownRelevancy {
     Raw,
     /// LERF's: from 0.5 to the largest in the view
     Lerf,
-    /// What the method's own rule cuts
+    /// Values that the method's own rule cuts
     Own,
 }
 

@@ -21,6 +21,7 @@ const MAX_SIDE_PX: u32 = 1_008;
 #[derive(Clone, Debug)]
 pub(crate) struct ResultEvaluation {
     pub(crate) labels: PathBuf,
+    pub(crate) views: WantedViews,
     /// Data set with the photos; else the cameras beside the result count.
     pub(crate) photos: Option<PathBuf>,
     pub(crate) max_side_px: Option<u32>,
@@ -38,6 +39,9 @@ pub(crate) struct ResultScores {
     pub(crate) rules: Vec<RuleScores>,
     /// Mean IoU if every pixel is given to its most relevant class (3D-OVS).
     pub(crate) argmax_miou: Option<f64>,
+    /// Comparisons of those classes.
+    #[serde(skip)]
+    pub(crate) argmax_units: Vec<Unit>,
     pub(crate) notes: Vec<String>,
 }
 
@@ -62,7 +66,7 @@ pub(crate) fn evaluate(
     }
     let mut scenes = [scene];
     let chosen = ViewRequest {
-        wanted: WantedViews::Labeled,
+        wanted: request.views.clone(),
         photos: request.photos.clone(),
         truth: Some(request.labels.clone()),
         max_side_px: request.max_side_px.unwrap_or(MAX_SIDE_PX),
@@ -88,8 +92,9 @@ pub(crate) fn evaluate(
             if category.is_none() && protocol != Protocol::Ovs3d {
                 continue;
             }
-            let levels = scene.answers.levels(class, &mut vectors)?;
-            let own = if category.is_some() { scene.answers.own_mask(class, &mut vectors)? } else { None };
+            let phrase = views::as_phrase(class);
+            let levels = scene.answers.levels(&phrase, &mut vectors)?;
+            let own = if category.is_some() { scene.answers.own_mask(&phrase, &mut vectors)? } else { None };
             let answer = PhraseInView { levels, own, size };
             winning.add(k, &answer);
             if let Some(category) = category {
@@ -111,6 +116,7 @@ pub(crate) fn evaluate(
         queries,
         rules: tally.scores(),
         argmax_miou: (protocol == Protocol::Ovs3d).then(|| means(&of_winner).0),
+        argmax_units: of_winner,
         notes,
     })
 }

@@ -194,7 +194,13 @@ fn a_scene_of_this_program_is_asked_like_the_others() {
 fn protocols_have_a_row_for_each_rule() {
     let folder = tempfile::tempdir().expect("folder");
     write_labels(folder.path(), "view_0");
-    let of = |protocol| ResultEvaluation { labels: folder.path().into(), photos: None, max_side_px: None, protocol };
+    let of = |protocol| ResultEvaluation {
+        labels: folder.path().into(),
+        views: WantedViews::Labeled,
+        photos: None,
+        max_side_px: None,
+        protocol,
+    };
     let opened = || ComparedScene::of_result(sample("langsplat_v2/output"), Path::new("x"));
     let scores = |protocol| evaluate(opened(), &of(protocol), &mut given, &mut Silent);
     let found = scores(Protocol::Langsplat).expect("measured");

@@ -8,6 +8,7 @@ use crate::jobs::{JobError, open, render};
 use crate::pipeline::observer::Silent;
 use crate::pipeline::semantics::evaluation::{Category, categories};
 use crate::pipeline::semantics::lifting::segmenter::{FileMasks, Segmenter};
+use crate::scene::identity::whole_names::BETWEEN;
 use crate::scene::{Camera, Photo};
 
 /// Names of missing labels that an error lists.
@@ -18,6 +19,8 @@ const LISTED: usize = 4;
 pub(crate) enum WantedViews {
     /// Photos by index or name, with commas between; 'all' for all.
     Listed(String),
+    /// Photos of these names.
+    Named(Vec<String>),
     /// All photos with labels.
     Labeled,
 }
@@ -46,11 +49,17 @@ pub(crate) struct ComparedView {
 }
 
 impl ComparedView {
-    /// The label that a phrase names.
+    /// The label that a phrase names; a part by its full name, or as "X of the Y".
     pub(crate) fn category(&self, phrase: &str) -> Option<&Category> {
         let wanted = phrase.trim().to_lowercase();
-        self.truth.as_ref()?.iter().find(|category| category.name.to_lowercase() == wanted)
+        let is = |name: &str| name.to_lowercase() == wanted;
+        self.truth.as_ref()?.iter().find(|category| is(&category.name) || is(&as_phrase(&category.name)))
     }
+}
+
+/// A full name as people say it: "X of the Y".
+pub(crate) fn as_phrase(name: &str) -> String {
+    name.split(BETWEEN).collect::<Vec<_>>().join(" of the ")
 }
 
 /// Chooses the views. Also returns notes on labels, a sentence each.
@@ -72,6 +81,7 @@ pub(crate) fn choose(
     let has_labels = |photo: &Photo| labels.as_ref().is_some_and(|(_, masks)| masks.covers(photo));
     let chosen: Vec<&Photo> = match &request.wanted {
         WantedViews::Labeled => photos.iter().filter(|photo| has_labels(photo)).collect(),
+        WantedViews::Named(names) => names.iter().map(|name| named(name, &photos)).collect::<Result<_, _>>()?,
         WantedViews::Listed(list) if list.trim() == "all" => photos.iter().collect(),
         WantedViews::Listed(list) => {
             let names = list.split(',').map(str::trim).filter(|name| !name.is_empty());
