@@ -103,10 +103,7 @@ pub(crate) fn run(args: &CompareArgs, quiet: bool) -> Result<(), CliError> {
     let mut encoders = InstalledEncoders::default();
     let mut encode = |name: &str, phrases: &[&str]| encoders.encode(name, phrases);
     let mut console = Console::new(quiet || args.json);
-    let found = compare::run(&request, &mut encode, &mut console).map_err(|e| match e.is_cancelled() {
-        true => CliError::of_views(e),
-        false => CliError::from(e),
-    })?;
+    let found = compare::run(&request, &mut encode, &mut console).map_err(CliError::of_views)?;
     drop(console);
     if args.json {
         return output::print_json(&found);

@@ -20,10 +20,7 @@ pub(super) fn run(
     let mut encoders = InstalledEncoders::default();
     let mut console = Console::new(quiet || as_json);
     let mut encode = |name: &str, phrases: &[&str]| encoders.encode(name, phrases);
-    let scores = protocol::evaluate(scene, request, &mut encode, &mut console).map_err(|e| match e.is_cancelled() {
-        true => CliError::of_views(e),
-        false => CliError::from(e),
-    })?;
+    let scores = protocol::evaluate(scene, request, &mut encode, &mut console).map_err(CliError::of_views)?;
     drop(console);
     scores.notes.iter().cloned().for_each(output::warn);
     if as_json {

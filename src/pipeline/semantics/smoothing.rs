@@ -135,6 +135,35 @@ mod tests {
     use super::*;
 
     #[test]
+    fn a_fifth_of_the_way_to_the_largest_is_cut_off() {
+        // The scale goes from 0.5 to 0.7, the cut is at 0.54.
+        let found = by_common_rule(&[vec![0.2, 0.5, 0.53, 0.55, 0.7, 0.69]], 3, 2).expect("a level");
+        assert_eq!(found.mask.pixels().collect::<Vec<_>>(), [3, 4, 5]);
+        assert_eq!((found.peak, found.values[0], found.values[4]), (Some(4), 0.0, 1.0));
+        let mask = |values: [f32; 2]| by_common_rule(&[values.to_vec()], 2, 1).expect("a level").mask;
+        assert!(mask([0.5, 0.1]).is_empty(), "nothing is more relevant than a canonical phrase");
+        assert!(mask([f32::NAN, f32::NAN]).is_empty());
+        assert!(by_common_rule(&[], 2, 1).is_none() && by_smoothing(&[], 2, 1).is_none());
+        assert_eq!(peak(&[0.6, 0.6]), Some(0));
+    }
+
+    #[test]
+    fn the_level_of_the_largest_value_is_smoothed_and_cut() {
+        let (w, h) = (64, 48);
+        let block = |x0: usize, height: f32| -> Vec<f32> {
+            (0..w * h).map(|i| if (x0..x0 + 20).contains(&(i % w)) && i / w >= 24 { height } else { 0.3 }).collect()
+        };
+        let found = by_smoothing(&[block(4, 0.6), block(40, 0.9)], w, h).expect("a level");
+        assert_eq!(found.level, 1);
+        assert!(found.mask.contains(40 * w + 50) && !found.mask.contains(40 * w + 10));
+        assert!(found.peak.is_some_and(|at| at % w >= 40 && at / w >= 24), "{:?}", found.peak);
+        assert!(found.values.iter().all(|v| (0.0..=1.0).contains(v)) && found.values.contains(&1.0));
+        let other = by_smoothing(&[block(4, 0.9), block(40, 0.6)], w, h).expect("a level");
+        assert_eq!(other.level, 0, "the control: levels exchanged");
+        assert!(by_smoothing(&[vec![0.5; w * h]], w, h).expect("a level").mask.is_empty());
+    }
+
+    #[test]
     fn the_box_filter_is_a_mean_with_mirrored_edges() {
         let (w, h) = (41, 33);
         let v: Vec<f32> = (0..w * h).map(|i| ((i * 37) % 101) as f32).collect();
