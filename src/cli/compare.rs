@@ -1,13 +1,13 @@
 //! `fmlgs compare`: results of any method side by side.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use super::progress::Console;
 use super::{CliError, number, output};
 use crate::io::results::ResultOptions;
 use crate::jobs::compare::cell::{ComparedCell, ShownRelevancy};
 use crate::jobs::compare::vectors::InstalledEncoders;
-use crate::jobs::compare::views::{ViewRequest, WantedViews};
+use crate::jobs::compare::views::{ViewChoice, WantedViews};
 use crate::jobs::compare::{self, CompareRequest, write};
 use crate::jobs::phrases;
 
@@ -26,9 +26,11 @@ const ROWS: usize = 60;
     fmlgs compare a/ b/ c/ d/ --phrases words.txt --views 0,12 --truth labels/ --out side_by_side/\n  \
     fmlgs compare a/ b/ --phrases words.txt --views all --photos figurines/ --json")]
 pub(crate) struct CompareArgs {
-    /// Two to four scenes: folders or files
-    #[arg(required = true, num_args = 2..=compare::MOST_SCENES)]
-    scenes: Vec<PathBuf>,
+    /// First scene, a folder or file: pictures of the views are its own
+    first: PathBuf,
+    /// One to three scenes to compare it with
+    #[arg(required = true, num_args = 1..compare::MOST_SCENES)]
+    others: Vec<PathBuf>,
     /// Text file with a phrase on each line
     #[arg(long, value_name = "FILE")]
     phrases: PathBuf,
@@ -73,8 +75,8 @@ fn result_and_file(given: &str) -> Result<(PathBuf, PathBuf), String> {
 
 impl CompareArgs {
     fn request(&self) -> Result<CompareRequest, CliError> {
-        let is_scene = |path: &Path| self.scenes.iter().any(|scene| scene == path);
-        if let Some((result, _)) = self.decoder.iter().find(|(result, _)| !is_scene(result)) {
+        let scenes: Vec<&PathBuf> = std::iter::once(&self.first).chain(&self.others).collect();
+        if let Some((result, _)) = self.decoder.iter().find(|(result, _)| !scenes.contains(&result)) {
             return Err(CliError::Usage(format!("--decoder: '{}' is none of the scenes", result.display())));
         }
         let options = |scene: &PathBuf| {
@@ -82,9 +84,9 @@ impl CompareArgs {
             ResultOptions { decoder: own.map(|(_, file)| file.clone()), ..ResultOptions::default() }
         };
         Ok(CompareRequest {
-            scenes: self.scenes.iter().map(|scene| (scene.clone(), options(scene))).collect(),
+            scenes: scenes.into_iter().map(|scene| (scene.clone(), options(scene))).collect(),
             phrases: phrases::read(&self.phrases)?,
-            views: ViewRequest {
+            views: ViewChoice {
                 wanted: WantedViews::Listed(self.views.clone()),
                 photos: self.photos.clone(),
                 truth: self.truth.clone(),

@@ -11,7 +11,7 @@ use super::{CliError, eval_depth, eval_language, eval_masks, eval_removal, eval_
 use crate::io::results::ResultOptions;
 use crate::jobs::batch::BatchEvaluation;
 use crate::jobs::compare::protocol::ResultEvaluation;
-use crate::jobs::compare::subject::ComparedScene;
+use crate::jobs::compare::subject::CompareSubject;
 use crate::jobs::compare::views::WantedViews;
 use crate::jobs::evaluate::{self, EvaluateOptions, PhotoComparison};
 use crate::jobs::evaluate_masks::Protocol;
@@ -99,9 +99,9 @@ pub(super) fn of_table(table: &toml::Table) -> Result<BatchEvaluation, String> {
 
 impl EvalArgs {
     /// The scene, if it is the result of another method.
-    fn result(&self) -> Result<Option<ComparedScene>, CliError> {
+    fn result(&self) -> Result<Option<CompareSubject>, CliError> {
         let options = ResultOptions { decoder: self.decoder.clone(), ..ResultOptions::default() };
-        Ok(ComparedScene::of_another_method(&self.scene, &options)?)
+        Ok(CompareSubject::of_another_method(&self.scene, &options)?)
     }
 
     /// Choices for another method's result; options of this program's own answers have no effect there.

@@ -5,13 +5,13 @@ use serde_json::json;
 use super::progress::Console;
 use super::{CliError, output};
 use crate::jobs::compare::protocol::{self, ResultEvaluation, ResultScores};
-use crate::jobs::compare::subject::ComparedScene;
+use crate::jobs::compare::subject::CompareSubject;
 use crate::jobs::compare::vectors::InstalledEncoders;
 use crate::jobs::evaluate_masks::Protocol;
 use crate::math::format::things;
 
 pub(super) fn run(
-    scene: ComparedScene,
+    scene: CompareSubject,
     request: &ResultEvaluation,
     as_json: bool,
     quiet: bool,

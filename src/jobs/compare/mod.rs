@@ -21,10 +21,10 @@ use std::time::Instant;
 
 use self::cell::{AnswerMs, ComparedCell, ComparedMethod, Comparison, RuledCell, ShownRelevancy};
 use self::sheet::SheetRow;
-use self::subject::ComparedScene;
-use self::tile::{CellTile, Picture};
+use self::subject::CompareSubject;
+use self::tile::{CellTile, TilePicture};
 use self::vectors::{KnownVectors, TextFunction};
-use self::views::{ComparedView, ViewRequest};
+use self::views::{ComparedView, ViewChoice};
 use super::{JobError, export};
 use crate::io::results::ResultOptions;
 use crate::math::format::things;
@@ -46,7 +46,7 @@ pub(crate) const MOST_SCENES: usize = 4;
 pub(crate) struct CompareRequest {
     pub(crate) scenes: Vec<(PathBuf, ResultOptions)>,
     pub(crate) phrases: Vec<String>,
-    pub(crate) views: ViewRequest,
+    pub(crate) views: ViewChoice,
     /// Runs that times are medians of.
     pub(crate) repeats: usize,
     pub(crate) shown: ShownRelevancy,
@@ -70,14 +70,14 @@ pub(crate) fn run(
         let others = [&request.views.photos, &request.views.truth].into_iter().flatten().map(PathBuf::as_path);
         write::check(folder, &reads.chain(others).collect::<Vec<_>>())?;
     }
-    let opened = request.scenes.iter().map(|(path, options)| ComparedScene::open(path, options));
+    let opened = request.scenes.iter().map(|(path, options)| CompareSubject::open(path, options));
     let scenes = opened.collect::<Result<Vec<_>, _>>()?;
     of_scenes(scenes, request, encode, observer)
 }
 
 /// Compares scenes that are open.
 fn of_scenes(
-    mut scenes: Vec<ComparedScene>,
+    mut scenes: Vec<CompareSubject>,
     request: &CompareRequest,
     encode: TextFunction<'_>,
     observer: &mut dyn Observer,
@@ -151,7 +151,7 @@ fn unlabeled(views: &[ComparedView], phrases: &[String]) -> Vec<String> {
     phrases.iter().filter(is_unknown).map(|phrase| format!("no label of these views is called '{phrase}'")).collect()
 }
 
-fn method(scene: &ComparedScene) -> ComparedMethod {
+fn method(scene: &CompareSubject) -> ComparedMethod {
     ComparedMethod {
         method: scene.name.clone(),
         path: scene.path.display().to_string(),
@@ -168,15 +168,15 @@ fn method(scene: &ComparedScene) -> ComparedMethod {
 }
 
 /// Colors of the first scene in a view.
-fn colors(scenes: &[ComparedScene], view: &ComparedView) -> Result<Picture, JobError> {
+fn colors(scenes: &[CompareSubject], view: &ComparedView) -> Result<TilePicture, JobError> {
     let (Some(scene), Some(camera)) = (scenes.first(), view.cameras.first()) else {
         return Err(JobError::Phrases("there is nothing to compare".into()));
     };
     let frame = Renderer::new().render(&scene.cloud, Features::NONE, camera, &scene.settings)?;
-    Ok(Picture::of_view(&frame.to_rgb8(), (frame.width_px, frame.height_px)))
+    Ok(TilePicture::of_view(&frame.to_rgb8(), (frame.width_px, frame.height_px)))
 }
 
-fn row_of(colors: &Picture, view: &ComparedView, phrase: &str) -> SheetRow {
+fn row_of(colors: &TilePicture, view: &ComparedView, phrase: &str) -> SheetRow {
     let mut colors = colors.clone();
     if let Some(category) = view.category(phrase) {
         colors.label(&category.mask);
@@ -196,7 +196,7 @@ struct Asked<'a> {
 impl Asked<'_> {
     fn of(
         &self,
-        scene: &mut ComparedScene,
+        scene: &mut CompareSubject,
         vectors: &mut KnownVectors<'_>,
     ) -> Result<(ComparedCell, Option<CellMaps>), JobError> {
         let Self { view, phrase, camera, blend, repeats } = *self;
@@ -238,7 +238,7 @@ type TimedAnswer = (Vec<Vec<f32>>, Option<ForeignMask>, f64, f64);
 
 /// Relevancy of all levels and the mask by the own rule, with the milliseconds of encoding and decoding.
 fn answered(
-    scene: &mut ComparedScene,
+    scene: &mut CompareSubject,
     phrase: &str,
     vectors: &mut KnownVectors<'_>,
     repeats: usize,

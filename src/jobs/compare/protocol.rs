@@ -5,9 +5,9 @@ use std::path::PathBuf;
 
 use serde::Serialize;
 
-use super::subject::ComparedScene;
+use super::subject::CompareSubject;
 use super::vectors::{KnownVectors, TextFunction};
-use super::views::{self, ViewRequest, WantedViews};
+use super::views::{self, ViewChoice, WantedViews};
 use crate::jobs::JobError;
 use crate::jobs::evaluate_masks::Protocol;
 use crate::pipeline::observer::{Observer, Ticker};
@@ -50,7 +50,7 @@ pub(crate) struct ResultScores {
 /// # Errors
 /// If the protocol needs objects of this program, the result cannot be read or asked, or there are no labels.
 pub(crate) fn evaluate(
-    scene: ComparedScene,
+    scene: CompareSubject,
     request: &ResultEvaluation,
     encode: TextFunction<'_>,
     observer: &mut dyn Observer,
@@ -65,7 +65,7 @@ pub(crate) fn evaluate(
         return Err(JobError::Protocol(text));
     }
     let mut scenes = [scene];
-    let chosen = ViewRequest {
+    let chosen = ViewChoice {
         wanted: request.views.clone(),
         photos: request.photos.clone(),
         truth: Some(request.labels.clone()),

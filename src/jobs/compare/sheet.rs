@@ -5,7 +5,7 @@ use image::{Rgb, RgbImage};
 
 use super::cell::{ComparedCell, Comparison, RuledCell, ShownRelevancy};
 use super::letters::{Lettering, TextStyle};
-use super::tile::{CellTile, Picture, tile_size};
+use super::tile::{CellTile, TilePicture, tile_size};
 use crate::math::colormap::Colormap;
 
 /// Rows of a sheet at most.
@@ -24,7 +24,7 @@ const PALE_INK: [u8; 3] = [90, 90, 96];
 /// Small pictures of a row.
 pub(super) struct SheetRow {
     /// The view with the outline of the label.
-    pub(super) view: Picture,
+    pub(super) view: TilePicture,
     /// One for each scene; `None` without an answer.
     pub(super) cells: Vec<Option<CellTile>>,
 }
@@ -109,7 +109,7 @@ impl Drawing {
         self.text(at, text, (12.0, INK), (width, 1));
     }
 
-    fn put(&mut self, at: [u32; 2], tile: &Picture) {
+    fn put(&mut self, at: [u32; 2], tile: &TilePicture) {
         for (i, rgb) in tile.rgb.iter().enumerate() {
             let (x, y) = ((i % tile.size.0) as u32, (i / tile.size.0) as u32);
             if let Some(pixel) = self.picture.get_pixel_mut_checked(at[0] + x, at[1] + y) {
@@ -120,7 +120,7 @@ impl Drawing {
 
     /// A gray field that says why it is empty.
     fn nothing(&mut self, at: [u32; 2], size: (usize, usize), why: &str) {
-        self.put(at, &Picture { size, rgb: vec![EMPTY; size.0 * size.1] });
+        self.put(at, &TilePicture { size, rgb: vec![EMPTY; size.0 * size.1] });
         self.text([at[0] + 10, at[1] + 10], why, (13.0, INK), ((size.0 as u32).saturating_sub(20).max(40), 8));
     }
 
@@ -129,7 +129,7 @@ impl Drawing {
         let color = |i: usize| Colormap::Turbo.color((i % BAR.0) as f32 / (BAR.0 - 1) as f32);
         let [least, most] = comparison.range.map(|v| format!("{v:.2}"));
         self.text(at, &least, (13.0, INK), (40, 1));
-        self.put([at[0] + 40, at[1] + 2], &Picture { size: BAR, rgb: (0..BAR.0 * BAR.1).map(color).collect() });
+        self.put([at[0] + 40, at[1] + 2], &TilePicture { size: BAR, rgb: (0..BAR.0 * BAR.1).map(color).collect() });
         self.text([at[0] + 40 + BAR.0 as u32 + 8, at[1]], &most, (13.0, INK), (40, 1));
         let what = match comparison.shown {
             ShownRelevancy::Raw => "relevancy as it is, one scale for all",

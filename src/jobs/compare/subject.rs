@@ -39,7 +39,7 @@ pub(crate) trait PhraseAnswers {
 }
 
 /// A scene that is compared.
-pub(crate) struct ComparedScene {
+pub(crate) struct CompareSubject {
     /// Its method, made distinct from the others.
     pub(crate) name: String,
     pub(crate) path: PathBuf,
@@ -54,7 +54,7 @@ pub(crate) struct ComparedScene {
     pub(crate) answers: Box<dyn PhraseAnswers>,
 }
 
-impl ComparedScene {
+impl CompareSubject {
     /// Opens a scene of this program, or the result of another method.
     ///
     /// # Errors
@@ -126,7 +126,7 @@ fn is_own(path: &Path) -> bool {
 }
 
 /// Makes names of equal methods distinct: by the folder, then by a number.
-pub(crate) fn name_apart(scenes: &mut [ComparedScene]) {
+pub(crate) fn name_apart(scenes: &mut [CompareSubject]) {
     let is_again = |names: &[String], k: usize| names.iter().filter(|name| **name == names[k]).count() > 1;
     let methods: Vec<String> = scenes.iter().map(|s| s.name.clone()).collect();
     for (k, scene) in scenes.iter_mut().enumerate().filter(|(k, _)| is_again(&methods, *k)) {

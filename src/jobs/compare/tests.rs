@@ -27,7 +27,7 @@ fn request(scenes: &[&str], views: &str) -> CompareRequest {
     CompareRequest {
         scenes: scenes.iter().map(|s| (samples().join(s), ResultOptions::default())).collect(),
         phrases: vec!["kettle".into()],
-        views: ViewRequest { wanted: WantedViews::Listed(views.into()), photos: None, truth: None, max_side_px: 1_008 },
+        views: ViewChoice { wanted: WantedViews::Listed(views.into()), photos: None, truth: None, max_side_px: 1_008 },
         repeats: 1,
         shown: ShownRelevancy::Raw,
         out: None,
@@ -44,7 +44,7 @@ fn refused(request: &CompareRequest) -> String {
 }
 
 /// The mask of the kettle by the common rule in the first view.
-fn common(scene: &mut ComparedScene, camera: &Camera) -> ForeignMask {
+fn common(scene: &mut CompareSubject, camera: &Camera) -> ForeignMask {
     let mut encode = given;
     let mut vectors = KnownVectors::new(&mut encode, 1);
     scene.answers.look(camera).expect("drawn");
@@ -57,7 +57,7 @@ fn common(scene: &mut ComparedScene, camera: &Camera) -> ForeignMask {
 fn write_labels(folder: &Path, view: &str) -> Mask {
     let result = sample("langsplat_v2/output");
     let camera = result.cameras[0].camera.clone();
-    let mask = common(&mut ComparedScene::of_result(result, Path::new("x")), &camera).mask;
+    let mask = common(&mut CompareSubject::of_result(result, Path::new("x")), &camera).mask;
     assert!(!mask.is_empty());
     let own = folder.join("test_mask").join(view);
     export::make_folder(&own).expect("made");
@@ -109,7 +109,7 @@ fn labels_give_scores_and_exchanged_levels_lower_them() {
     let mut result = sample("langsplat_v2/output");
     let level = first.level;
     result.levels[level].values = result.levels[(level + 1) % 3].values.clone();
-    let scenes = vec![ComparedScene::of_result(result, Path::new("exchanged"))];
+    let scenes = vec![CompareSubject::of_result(result, Path::new("exchanged"))];
     let other = of_scenes(scenes, &asked, &mut given, &mut Silent).expect("compared");
     assert!(other.methods[0].common_miou.is_some_and(|iou| iou < 0.99), "{:?}", other.methods[0]);
     // A phrase that nobody labeled.
@@ -161,7 +161,7 @@ fn files_are_written_once_and_load_nothing() {
 }
 
 /// Two blobs, a lamp and a mug, by their names.
-fn own_scene() -> (ComparedScene, Camera) {
+fn own_scene() -> (CompareSubject, Camera) {
     let mut all = Identities::default();
     let lamp = all.add(Level::Object, NO_IDENTITY, vec!["lamp".into()]);
     let kettle = all.add(Level::Object, NO_IDENTITY, vec!["kettle".into()]);
@@ -170,13 +170,13 @@ fn own_scene() -> (ComparedScene, Camera) {
     let camera = Camera::look_at(DVec3::new(0.0, 0.0, -3.0), DVec3::ZERO, DVec3::NEG_Y, 0.8, 64, 48).expect("valid");
     let cameras = vec![SceneCamera { name: "a.png".into(), camera: camera.clone(), held_out: false }];
     let scene = Scene { path: "own".into(), cloud: Arc::new(cloud), cameras, ..Scene::default() };
-    (ComparedScene::own(scene, map).expect("names need no encoder"), camera)
+    (CompareSubject::own(scene, map).expect("names need no encoder"), camera)
 }
 
 #[test]
 fn a_scene_of_this_program_is_asked_like_the_others() {
     let (own, _) = own_scene();
-    let ludvig = ComparedScene::of_result(sample("ludvig"), Path::new("ludvig"));
+    let ludvig = CompareSubject::of_result(sample("ludvig"), Path::new("ludvig"));
     let mut asked = request(&[], "a");
     asked.phrases = vec!["kettle".into(), "giraffe".into()];
     let found = of_scenes(vec![own, ludvig], &asked, &mut given, &mut Silent).expect("compared");
@@ -201,7 +201,7 @@ fn protocols_have_a_row_for_each_rule() {
         max_side_px: None,
         protocol,
     };
-    let opened = || ComparedScene::of_result(sample("langsplat_v2/output"), Path::new("x"));
+    let opened = || CompareSubject::of_result(sample("langsplat_v2/output"), Path::new("x"));
     let scores = |protocol| evaluate(opened(), &of(protocol), &mut given, &mut Silent);
     let found = scores(Protocol::Langsplat).expect("measured");
     let rows: Vec<CutRule> = found.rules.iter().map(|r| r.rule).collect();
@@ -215,6 +215,6 @@ fn protocols_have_a_row_for_each_rule() {
     assert!(classes.argmax_miou.is_some_and(|miou| miou < 1.0), "one class has every pixel");
     let e = scores(Protocol::Strokes).expect_err("refused").to_string();
     assert!(e.contains("strokes") && e.contains("3d-ovs"), "{e}");
-    let none = ComparedScene::of_another_method(&samples().join("mip_splatting"), &ResultOptions::default());
+    let none = CompareSubject::of_another_method(&samples().join("mip_splatting"), &ResultOptions::default());
     assert!(none.expect("no error").is_none(), "a plain training");
 }

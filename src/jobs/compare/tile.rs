@@ -41,10 +41,10 @@ impl CellTile {
     }
 
     /// Colors, with a range from the first color to the last.
-    pub(super) fn colors(&self, [least, most]: [f32; 2]) -> Picture {
+    pub(super) fn colors(&self, [least, most]: [f32; 2]) -> TilePicture {
         let scaled = |v: &f32| (v - least) / (most - least).max(1e-6);
         let rgb = self.values.iter().map(|v| Colormap::Turbo.color(scaled(v))).collect();
-        let mut picture = Picture { size: self.size, rgb };
+        let mut picture = TilePicture { size: self.size, rgb };
         picture.outline(&self.mask, INSIDE, Some(OUTSIDE));
         picture
     }
@@ -52,12 +52,12 @@ impl CellTile {
 
 /// A small picture.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct Picture {
+pub(super) struct TilePicture {
     pub(super) size: (usize, usize),
     pub(super) rgb: Vec<[u8; 3]>,
 }
 
-impl Picture {
+impl TilePicture {
     /// The view's colors, made small.
     pub(super) fn of_view(rgb: &[[u8; 3]], from: (usize, usize)) -> Self {
         let size = tile_size(from);
@@ -111,7 +111,7 @@ mod tests {
         assert_eq!(at(20), Colormap::Turbo.color(0.0));
         assert_ne!(at(300), at(20));
         assert_eq!(CellTile::new(&vec![0.0; w * h], &Mask::empty(w, h)).range(), None);
-        let mut colors = Picture::of_view(&vec![[10, 20, 30]; w * h], (w, h));
+        let mut colors = TilePicture::of_view(&vec![[10, 20, 30]; w * h], (w, h));
         assert!(colors.rgb.iter().all(|p| *p == [10, 20, 30]));
         colors.label(&mask);
         assert!(colors.rgb.contains(&LABEL));

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use super::subject::ComparedScene;
+use super::subject::CompareSubject;
 use crate::io::labels::{Labels, stem};
 use crate::jobs::{JobError, open, render};
 use crate::pipeline::observer::Silent;
@@ -27,7 +27,7 @@ pub(crate) enum WantedViews {
 
 /// Request for views.
 #[derive(Clone, Debug)]
-pub(crate) struct ViewRequest {
+pub(crate) struct ViewChoice {
     pub(crate) wanted: WantedViews,
     /// Data set with the photos; else that of the first scene that has one, or its cameras.
     pub(crate) photos: Option<PathBuf>,
@@ -67,8 +67,8 @@ pub(crate) fn as_phrase(name: &str) -> String {
 /// # Errors
 /// If there are no cameras, a photo is not found, or labels cannot be read or belong to none of the views.
 pub(crate) fn choose(
-    scenes: &[ComparedScene],
-    request: &ViewRequest,
+    scenes: &[CompareSubject],
+    request: &ViewChoice,
 ) -> Result<(Vec<ComparedView>, Vec<String>), JobError> {
     let photos = photos_of(scenes, request.photos.as_deref())?;
     let mut notes = Vec::new();
@@ -120,7 +120,7 @@ pub(crate) fn choose(
 }
 
 /// Photos of the data set, or those that the first scene with cameras knows.
-fn photos_of(scenes: &[ComparedScene], given: Option<&Path>) -> Result<Vec<Photo>, JobError> {
+fn photos_of(scenes: &[CompareSubject], given: Option<&Path>) -> Result<Vec<Photo>, JobError> {
     if let Some(path) = given.or_else(|| scenes.iter().find_map(|s| s.photos.as_deref())) {
         return Ok(open::dataset(path)?.photos);
     }
@@ -147,7 +147,7 @@ fn named<'a>(wanted: &str, photos: &'a [Photo]) -> Result<&'a Photo, JobError> {
 
 /// The scene's own camera of a photo, in the size of the view's, so that scenes in coordinates of their own show the
 /// same; else the view's camera.
-fn camera_of(scene: &ComparedScene, name: &str, view: &Camera) -> Camera {
+fn camera_of(scene: &CompareSubject, name: &str, view: &Camera) -> Camera {
     let mut same = scene.cameras.iter().filter(|c| stem(&c.name) == stem(name));
     let alike = same.next().filter(|_| same.next().is_none());
     let own = scene.cameras.iter().find(|c| c.name == name).or(alike).map(|c| &c.camera);

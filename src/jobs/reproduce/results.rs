@@ -11,7 +11,7 @@ use super::{PaperTable, ReproduceRequest};
 use crate::io::results::ResultOptions;
 use crate::jobs::JobError;
 use crate::jobs::compare::protocol::{self, ResultEvaluation, ResultScores};
-use crate::jobs::compare::subject::ComparedScene;
+use crate::jobs::compare::subject::CompareSubject;
 use crate::jobs::compare::vectors::InstalledEncoders;
 use crate::jobs::compare::views::WantedViews;
 use crate::jobs::evaluate_masks::Protocol;
@@ -40,8 +40,8 @@ pub(super) fn check(request: &ReproduceRequest, scenes: &[SceneInput]) -> Result
     Ok(())
 }
 
-fn opened(path: &std::path::Path) -> Result<ComparedScene, JobError> {
-    ComparedScene::open(path, &ResultOptions::default())
+fn opened(path: &std::path::Path) -> Result<CompareSubject, JobError> {
+    CompareSubject::open(path, &ResultOptions::default())
 }
 
 /// Adds the rows of a scene's results. Returns notes on them.
