@@ -107,7 +107,7 @@ fn of_scenes(
                 let asked = Asked { view, phrase, camera: k, blend: median(&blend), repeats };
                 let (cell, maps) = asked.of(scene, &mut vectors)?;
                 if let (Some(maps), Some(folder), true) = (&maps, &request.out, request.arrays) {
-                    maps.write(&folder.join("relevancy"), &format!("{p:03}_{v:03}_{}", k + 1))?;
+                    maps.write(&folder.join(write::ARRAYS), &format!("{p:03}_{v:03}_{}", k + 1))?;
                 }
                 let at = place(p, v);
                 if at < sheet::MOST_ROWS {

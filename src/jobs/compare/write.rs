@@ -13,6 +13,9 @@ use crate::measure::page::STYLE;
 /// Names of the files.
 pub(super) const FILES: [&str; 4] = ["compare.json", "compare.csv", "compare.png", "compare.html"];
 
+/// Folder of the arrays.
+pub(super) const ARRAYS: &str = "relevancy";
+
 /// Heads of the table of cells.
 pub(crate) const HEAD: [&str; 11] = [
     "phrase",
@@ -164,7 +167,7 @@ impl Comparison {
 /// If a file would be replaced, or the folder holds inputs.
 pub(super) fn check(folder: &Path, reads: &[&Path]) -> Result<(), JobError> {
     export::check_folder(folder, reads)?;
-    match FILES.iter().map(|name| folder.join(name)).find(|file| file.exists()) {
+    match FILES.iter().chain([&ARRAYS]).map(|name| folder.join(name)).find(|file| file.exists()) {
         Some(file) => Err(JobError::Output(format!("'{}' is there already; give another --out", file.display()))),
         None => Ok(()),
     }
