@@ -1,18 +1,23 @@
 //! `fmlgs eval`: PSNR and SSIM on held-out photos, with pictures side by side.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use serde_json::json;
 
 use super::progress::Console;
 use super::recipe::RecipeArgs;
 use super::scene_args::open_scene;
-use super::{CliError, eval_depth, eval_language, eval_masks, eval_removal, number, output, table_args};
+use super::{CliError, eval_depth, eval_language, eval_masks, eval_removal, eval_results, number, output, table_args};
+use crate::io::results::ResultOptions;
 use crate::jobs::batch::BatchEvaluation;
+use crate::jobs::compare::protocol::ResultEvaluation;
+use crate::jobs::compare::subject::CompareSubject;
+use crate::jobs::compare::views::WantedViews;
 use crate::jobs::evaluate::{self, EvaluateOptions, PhotoComparison};
 use crate::jobs::evaluate_masks::Protocol;
 use crate::jobs::export;
 use crate::pipeline::observer::{Evaluation, ViewScore};
+use crate::pipeline::semantics::query::recipe::QueryConfig;
 
 /// Measure PSNR and SSIM of a scene on held-out photos
 ///
@@ -20,6 +25,9 @@ use crate::pipeline::observer::{Evaluation, ViewScore};
 /// give the photos with --photos. SSIM is that of the 3D Gaussian Splatting literature (11 x 11
 /// Gaussian window). Photos are undistorted and scaled as in training. What training saw is marked "trained on"
 /// and has a mean of its own. A splat is drawn before the photos' background.
+///
+/// With --masks, the scene may be the result of another method: the protocols masks, langsplat, 3d-ovs and part-recall
+/// then have a row for each rule that makes masks, the method's own among them.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  \
     fmlgs eval scene/\n  \
@@ -28,6 +36,7 @@ use crate::pipeline::observer::{Evaluation, ViewScore};
     fmlgs eval scene/ --removal behind/         what 'fmlgs remove' uncovers and invents\n  \
     fmlgs eval scene/ --masks photos/           objects and parts against labels\n  \
     fmlgs eval scene/ --masks photos/ --protocol part-recall\n  \
+    fmlgs eval langsplat/output --masks label/ --photos figurines/ --protocol langsplat\n  \
     fmlgs eval splat.ply --photos photos/ --max-side 1600 --json")]
 pub(crate) struct EvalArgs {
     /// Trained scene or splat file
@@ -57,6 +66,9 @@ pub(crate) struct EvalArgs {
     /// Query to ask, where labels do not name it (spin-nerf)
     #[arg(long, requires = "masks")]
     query: Option<String>,
+    /// Decoder, codebook or index of another method's result, where it is not found beside it
+    #[arg(long, requires = "masks")]
+    decoder: Option<PathBuf>,
     /// Compare depth instead, with the true depths that came with synthetic photos
     #[arg(long, conflicts_with = "masks")]
     depth: bool,
@@ -77,8 +89,8 @@ pub(crate) struct EvalArgs {
 
 /// The table `[eval]` of a batch.
 pub(super) fn of_table(table: &toml::Table) -> Result<BatchEvaluation, String> {
-    const LEFT_OUT: [&str; 9] =
-        ["photos", "held-out-every", "pictures", "masks", "query", "depth", "removal", "questions", "json"];
+    const LEFT_OUT: [&str; 10] =
+        ["photos", "held-out-every", "pictures", "masks", "decoder", "query", "depth", "removal", "questions", "json"];
     // Labels are those of each scene.
     let args: EvalArgs = table_args::parse("batch eval", table, &["scene", "--masks=labels"], &LEFT_OUT)?;
     let EvalArgs { max_side, keep_borders, protocol, recipe, .. } = args;
@@ -86,6 +98,32 @@ pub(super) fn of_table(table: &toml::Table) -> Result<BatchEvaluation, String> {
 }
 
 impl EvalArgs {
+    /// The scene, if it is the result of another method.
+    fn result(&self) -> Result<Option<CompareSubject>, CliError> {
+        let options = ResultOptions { decoder: self.decoder.clone(), ..ResultOptions::default() };
+        Ok(CompareSubject::of_another_method(&self.scene, &options)?)
+    }
+
+    /// Choices for another method's result; options of this program's own answers have no effect there.
+    fn of_result(&self, labels: &Path) -> Result<ResultEvaluation, CliError> {
+        let idle = [
+            (self.recipe.recipe() != QueryConfig::default(), "the recipe"),
+            (self.pictures.is_some(), "--pictures"),
+            (self.held_out_every.is_some(), "--held-out-every"),
+        ];
+        if let Some((_, what)) = idle.iter().find(|(given, _)| *given) {
+            let text = format!("{what} has no effect on another method's result; 'fmlgs compare' draws pictures of it");
+            return Err(CliError::Usage(text));
+        }
+        Ok(ResultEvaluation {
+            labels: labels.to_owned(),
+            views: WantedViews::Labeled,
+            photos: self.photos.clone(),
+            max_side_px: self.max_side,
+            protocol: self.protocol,
+        })
+    }
+
     fn check(&self) -> Result<PhotoComparison, CliError> {
         let scene = open_scene(&self.scene)?;
         let photos = scene.photos(self.photos.as_deref())?;
@@ -105,6 +143,15 @@ impl EvalArgs {
 pub(crate) fn run(args: EvalArgs, quiet: bool) -> Result<(), CliError> {
     if let Some(file) = &args.questions {
         return eval_language::run(&open_scene(&args.scene)?, file, &args.recipe.recipe(), args.json);
+    }
+    if let Some(labels) = &args.masks
+        && let Some(result) = args.result()?
+    {
+        return eval_results::run(result, &args.of_result(labels)?, args.json, quiet);
+    }
+    if args.decoder.is_some() {
+        let text = format!("--decoder has no effect here: '{}' is no result of another method", args.scene.display());
+        return Err(CliError::Usage(text));
     }
     let comparison = args.check()?;
     if let Some(labels) = &args.masks {

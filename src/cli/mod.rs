@@ -11,6 +11,7 @@ mod batch;
 mod bench;
 mod check_stability;
 mod clean;
+mod compare;
 mod connect;
 mod demo;
 mod edit;
@@ -20,6 +21,7 @@ mod eval_depth;
 mod eval_language;
 mod eval_masks;
 mod eval_removal;
+mod eval_results;
 mod export;
 mod generate;
 mod idle;
@@ -88,6 +90,7 @@ Examples:
   fmlgs render scene/ --camera 12 --out view.png
   fmlgs preprocess scene/ --masks photos/   find objects and parts
   fmlgs query scene/ \"the lid of the kettle\" --mask lid.png
+  fmlgs compare langsplat/ scene/ --phrases words.txt --views 0,12 --out side_by_side/
   fmlgs remove scene/ \"the kettle\" --out without_kettle/
   fmlgs path scene/ --to \"the lid of the kettle\" --out path.json
   fmlgs render scene/ --path path.json --out video.mp4
@@ -130,6 +133,7 @@ enum Command {
     Eval(eval::EvalArgs),
     Preprocess(preprocess::PreprocessArgs),
     Query(query::QueryArgs),
+    Compare(compare::CompareArgs),
     Models(models::ModelsArgs),
     Segment(segment::SegmentArgs),
     Remove(remove::RemoveArgs),
@@ -219,6 +223,7 @@ fn run(cli: Cli, open_window: OpenWindow) -> Result<(), CliError> {
         Command::Eval(args) => eval::run(args, quiet),
         Command::Preprocess(args) => preprocess::run(args, quiet),
         Command::Query(args) => query::run(args, quiet),
+        Command::Compare(args) => compare::run(&args, quiet),
         Command::Segment(args) => segment::run(args, quiet),
         Command::Remove(args) => remove::run(args, quiet),
         Command::Clean(args) => clean::run(args, quiet),

@@ -22,6 +22,7 @@ const MAX_SIDE_PX: u32 = 1_008;
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  \
     fmlgs reproduce lerf-ovs lerf_ovs/ --out out/lerf\n  \
+    fmlgs reproduce lerf-ovs lerf_ovs/ --result figurines=langsplat/output --out out/lerf\n  \
     fmlgs reproduce spin-nerf spin/ --query fork=\"a fork\" --out out/spin\n  \
     fmlgs reproduce 3d-ovs 3dovs/ --scene bed --masks regions --out out/bed\n  \
     fmlgs reproduce part-ablation scenes/ --masks labels --encoder demo --steps 2000 --out out/parts\n  \
@@ -52,6 +53,10 @@ pub(crate) struct ReproduceArgs {
     /// scene's name]
     #[arg(long = "query", value_parser = scene_and_text)]
     queries: Vec<(String, String)>,
+    /// Result of another method for a scene, as SCENE=RESULT: rows by its own rule, LangSplat's and a common one; may be
+    /// given several times (lerf-ovs, 3d-ovs, part-ablation)
+    #[arg(long = "result", value_name = "SCENE=RESULT", value_parser = scene_and_result)]
+    results: Vec<(String, PathBuf)>,
     /// Optimizer steps of each training
     #[arg(long, default_value_t = STEPS, value_parser = number::within(1..=1_000_000_000_u64))]
     steps: u64,
@@ -67,6 +72,13 @@ fn scene_and_text(given: &str) -> Result<(String, String), String> {
     match given.split_once('=') {
         Some((scene, text)) if !scene.is_empty() && !text.trim().is_empty() => Ok((scene.into(), text.into())),
         _ => Err("expected SCENE=TEXT".into()),
+    }
+}
+
+fn scene_and_result(given: &str) -> Result<(String, PathBuf), String> {
+    match given.split_once('=') {
+        Some((scene, path)) if !scene.is_empty() && !path.is_empty() => Ok((scene.into(), path.into())),
+        _ => Err("expected SCENE=RESULT".into()),
     }
 }
 
@@ -92,7 +104,8 @@ pub(crate) fn run(args: ReproduceArgs, quiet: bool) -> Result<(), CliError> {
         train,
         queries: args.queries.into_iter().collect(),
     };
-    let request = ReproduceRequest { data: args.data, out: args.out, scenes: args.scenes, settings };
+    let ReproduceArgs { data, out, scenes, results, .. } = args;
+    let request = ReproduceRequest { data, out, scenes, settings, results };
     let kept = "what was done is kept; the same command resumes";
     let document = reproduce::run(&request, &mut console).map_err(|e| match e.is_cancelled() {
         true => CliError::Cancelled(kept.into()),

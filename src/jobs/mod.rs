@@ -9,6 +9,7 @@ pub(crate) mod bench;
 pub(crate) mod changed;
 pub(crate) mod clean;
 mod coco;
+pub(crate) mod compare;
 pub(crate) mod demo;
 pub(crate) mod demo_questions;
 pub(crate) mod demo_tour;

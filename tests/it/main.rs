@@ -9,6 +9,7 @@ mod architecture;
 mod batch;
 mod cases;
 mod cli_basics;
+mod cli_compare;
 mod cli_depth;
 mod cli_language_features;
 mod cli_networks;

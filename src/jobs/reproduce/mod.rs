@@ -7,6 +7,7 @@
 
 mod layout;
 mod printed;
+mod results;
 mod rows;
 mod scene;
 mod table;
@@ -73,6 +74,8 @@ pub(crate) struct ReproduceRequest {
     /// Names of scenes; empty for all.
     pub(crate) scenes: Vec<String>,
     pub(crate) settings: ReproduceSettings,
+    /// Results of other methods by scene, measured beside this program's; they change no setting.
+    pub(crate) results: Vec<(String, PathBuf)>,
 }
 
 const SETTINGS_FILE: &str = "settings.json";
@@ -98,13 +101,17 @@ pub(crate) fn run(request: &ReproduceRequest, observer: &mut dyn Observer) -> Re
         return Err(JobError::Protocol(format!("--query {name}=...: {} has no scene '{name}'", data.display())));
     }
     check_models(settings)?;
+    results::check(request, &scenes)?;
     claim(out, data, settings)?;
-    let mut results = Vec::with_capacity(scenes.len());
+    let (mut results, mut notes) = (Vec::with_capacity(scenes.len()), Vec::new());
     for (k, input) in scenes.iter().enumerate() {
         observer.note(Severity::Info, format!("Scene {} of {}: {}", k + 1, scenes.len(), input.name));
-        results.push(scene::run(input, &out.join(&input.name), settings, observer)?);
+        let mut result = scene::run(input, &out.join(&input.name), settings, observer)?;
+        notes.extend(results::add(&mut result, input, request, observer)?);
+        results.push(result);
     }
-    let document = TableDocument::new(settings, results);
+    let mut document = TableDocument::new(settings, results);
+    document.notes.extend(notes);
     export::json(&out.join("table.json"), &document)?;
     export::text(&out.join("table.md"), &document.markdown())?;
     Ok(document)

@@ -20,7 +20,7 @@ use crate::pipeline::semantics::evaluation::by_similarity::{ALIKE, rejoined};
 use crate::pipeline::semantics::evaluation::part_recall::{self, Components, objects_alone};
 use crate::pipeline::semantics::evaluation::raw_features::RawFeatures;
 use crate::pipeline::semantics::evaluation::{
-    AskedScene, LabeledView, Unit, fastlgs_ex, langsplat, lerf_rule, multi_class, ref_lerf, spin_nerf,
+    AskedScene, LabeledView, Unit, fastlgs_ex, langsplat, multi_class, ref_lerf, spin_nerf,
 };
 use crate::pipeline::semantics::query::answer::QueryAnswer;
 use crate::pipeline::semantics::query::by_embedding::TextEmbeddings;
@@ -29,9 +29,10 @@ use crate::pipeline::semantics::query::parse::ParsedQuery;
 use crate::pipeline::semantics::query::query_engine::{QueryEngine, ask_by_embedding, ask_by_name};
 use crate::pipeline::semantics::query::recipe::{MatchBy, PartEmbedding, QueryConfig, RelevancyScale, Strategy};
 use crate::pipeline::semantics::query::timing::ms_since;
+use crate::pipeline::semantics::smoothing::by_common_rule;
 use crate::pipeline::semantics::view_map::ViewMap;
 use crate::render::Renderer;
-use crate::scene::{LanguageFeatures, LevelFilter, SemanticMap};
+use crate::scene::{LanguageFeatures, LevelFilter, Mask, SemanticMap};
 
 pub(super) const POOLED: &str = "running pooled IoU of FastLGS's evaluator, %";
 pub(super) const ARGMAX: &str = "mean IoU by arg-max over all classes, %";
@@ -268,16 +269,14 @@ impl Table<'_> {
     fn ruled_row(&self, name: &str, views: &[LabeledView<'_>], heat: Heat<'_>) -> Result<RowResult, JobError> {
         let (mut ious, mut hits, mut found) = (Vec::new(), Vec::new(), Vec::new());
         for (k, view) in views.iter().enumerate() {
-            let width_px = view.exact.width_px;
+            let (width_px, height_px) = (view.exact.width_px, view.exact.height_px);
             for phrase in self.phrases(view) {
-                let relevancy = heat(k, phrase)?.unwrap_or_default();
-                let mask = match relevancy.is_empty() {
-                    true => crate::scene::Mask::empty(width_px, view.exact.height_px),
-                    false => lerf_rule::mask(&relevancy, width_px),
-                };
+                let relevancy = heat(k, phrase)?.filter(|relevancy| !relevancy.is_empty());
+                let ruled = relevancy.and_then(|relevancy| by_common_rule(&[relevancy], width_px, height_px));
+                let empty = || (Mask::empty(width_px, height_px), None);
+                let (mask, at) = ruled.map_or_else(empty, |ruled| (ruled.mask, ruled.peak));
                 found.extend(spin_nerf::of_mask(&mask, view, phrase));
                 let Some(category) = view.categories.iter().find(|c| c.name == phrase) else { continue };
-                let at = lerf_rule::peak(&relevancy);
                 let hit = |at: usize| category.boxes.iter().any(|b| b.contains(at % width_px, at / width_px));
                 hits.push(f64::from(at.is_some_and(hit)));
                 ious.push(mask.iou(&category.mask));

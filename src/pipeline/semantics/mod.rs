@@ -10,7 +10,7 @@
 //! A room uses the rooms before it, never one after it. The modules beside the rooms use no room: [`view_map`] and
 //! [`code_map`] render the identities of a known map and their codes into a view, [`thumbnails`] renders each identity
 //! alone, [`relevancy`] compares embeddings, of phrases and of parts with their wholes, and [`smoothing`] makes masks
-//! of relevancy as LangSplat does.
+//! of relevancy as LangSplat does, and by a rule that is common to all methods.
 
 pub mod code_map;
 pub(crate) mod evaluation;

@@ -6,7 +6,7 @@
 
 use super::{AskedScene, LabeledView, Unit};
 use crate::pipeline::semantics::query::answer::QueryAnswer;
-use crate::pipeline::semantics::smoothing::{cut, largest, smoothed};
+use crate::pipeline::semantics::smoothing::by_smoothing;
 use crate::pipeline::semantics::view_map::ViewMap;
 use crate::scene::{Identities, IdentityId, Level, Mask};
 
@@ -28,15 +28,14 @@ pub(crate) fn compare(scene: &mut AskedScene<'_>, view: &LabeledView<'_>) -> Vec
 /// Mask and index of the most relevant pixel.
 fn answer(answered: &QueryAnswer, map: &ViewMap, identities: &Identities) -> (Mask, usize) {
     let (w, h) = (map.width_px, map.height_px);
-    let levels = [Level::Object, Level::Part].map(|level| {
-        let relevancy: Vec<f32> = map.identity.iter().map(|id| at_level(answered, identities, *id, level)).collect();
-        smoothed(&relevancy, w, h)
-    });
-    let by_v = usize::from(largest(&levels[1].1) > largest(&levels[0].1));
-    let by_avg = usize::from(largest(&levels[1].0) > largest(&levels[0].0));
-    let avg = &levels[by_avg].0;
-    let at = (0..avg.len()).max_by(|&a, &b| avg[a].total_cmp(&avg[b]).then(b.cmp(&a))).unwrap_or(0);
-    (cut(&levels[by_v].1, w, h), at)
+    let found = by_smoothing(&levels(answered, map, identities), w, h);
+    found.map_or_else(|| (Mask::empty(w, h), 0), |found| (found.mask, found.peak.unwrap_or(0)))
+}
+
+/// Relevancy of every pixel's object, and of its part.
+pub(crate) fn levels(answered: &QueryAnswer, map: &ViewMap, identities: &Identities) -> [Vec<f32>; 2] {
+    let at = |level| map.identity.iter().map(|id| at_level(answered, identities, *id, level)).collect();
+    [Level::Object, Level::Part].map(at)
 }
 
 /// Relevancy of a pixel's object, or of its part.

@@ -5,6 +5,7 @@
 //! [`raw_features`] and [`by_similarity`] are baselines without tracked identities. [`referring`] writes
 //! questions with their truth about scenes of meshes.
 
+pub(crate) mod by_rule;
 pub(crate) mod by_similarity;
 #[cfg(test)]
 mod end_to_end_tests;
@@ -12,7 +13,6 @@ pub(crate) mod fastlgs_ex;
 #[cfg(test)]
 mod hand_computed_tests;
 pub(crate) mod langsplat;
-pub(crate) mod lerf_rule;
 pub(crate) mod masks;
 pub(crate) mod multi_class;
 pub(crate) mod part_recall;

@@ -4,8 +4,9 @@ use super::asked::{ForeignScene, ForeignView, cluster_cosines};
 use super::blend::{self, BlendSource};
 use super::{ForeignError, ForeignPhrase};
 use crate::io::results::{ClusterLevel, LevelValues, Method, ResultLevel};
-use crate::pipeline::semantics::relevancy::{LERFS_SHARE, on_lerfs_scale};
-use crate::pipeline::semantics::smoothing::{cut, largest, smoothed};
+use crate::pipeline::semantics::smoothing::{
+    BY_COMMON_RULE, BY_SMOOTHING, LeveledMask, by_common_rule, by_smoothing, peak,
+};
 use crate::render::{Features, RenderSettings, Renderer};
 use crate::scene::Mask;
 
@@ -27,6 +28,10 @@ pub struct ForeignMask {
     pub mask: Mask,
     /// Level that it was taken from, or the first of several.
     pub level: usize,
+    /// Values that the rule cuts, row-major, 0 to 1.
+    pub values: Vec<f32>,
+    /// Pixel that the rule points at; `None` if it points at none.
+    pub peak: Option<usize>,
     /// The rule in words.
     pub rule: &'static str,
 }
@@ -41,52 +46,49 @@ impl ForeignScene {
     ) -> Result<ForeignMask, ForeignError> {
         let (w, h) = view.size();
         let method = self.result.method;
-        let threshold = |relevancy: &[f32], inside: fn(f32) -> bool| Mask::from_fn(w, h, |i| inside(relevancy[i]));
+        let threshold = |values: Vec<f32>, inside: fn(f32) -> bool, rule| {
+            let mask = Mask::from_fn(w, h, |i| inside(values[i]));
+            ForeignMask { mask, level: 0, peak: peak(&values), values, rule }
+        };
+        let covered = |(mask, values), level, rule| ForeignMask { mask, level, values, peak: None, rule };
         match method {
             Method::LangSplat | Method::LangSplatV2 | Method::OccamsLgs => {
-                let mut best: Option<(f32, usize, Vec<f32>)> = None;
+                let mut levels = Vec::with_capacity(self.result.levels.len());
                 for level in 0..self.result.levels.len() {
-                    let relevancy = self.relevancy_of_method(renderer, view, level, phrase)?;
-                    let v = smoothed(&relevancy, w, h).1;
-                    let most = largest(&v);
-                    if best.as_ref().is_none_or(|(before, ..)| most > *before) {
-                        best = Some((most, level, v));
-                    }
+                    levels.push(self.relevancy_of_method(renderer, view, level, phrase)?);
                 }
-                let (_, level, v) = best.ok_or(ForeignError::Level(0))?;
-                let rule = "smoothed by 30 px, normalized, over 0.4; level of the largest value";
-                Ok(ForeignMask { mask: cut(&v, w, h), level, rule })
+                let found = by_smoothing(&levels, w, h).ok_or(ForeignError::Level(0))?;
+                let LeveledMask { mask, level, values, peak } = found;
+                Ok(ForeignMask { mask, level, values, peak, rule: BY_SMOOTHING })
             }
             Method::LeGaussians => {
                 let phrase = ForeignPhrase { temperature: LEGAUSSIANS_TEMPERATURE, ..phrase };
                 let relevancy = self.relevancy_of_method(renderer, view, 0, phrase)?;
-                let rule = "relevancy of 0.5 or more";
-                Ok(ForeignMask { mask: threshold(&relevancy, |r| r >= 0.5), level: 0, rule })
+                Ok(threshold(relevancy, |r| r >= 0.5, "relevancy of 0.5 or more"))
             }
             Method::Feature3dgs => {
                 let relevancy = self.relevancy_of_method(renderer, view, 0, phrase)?;
-                let rule = "more alike to the phrase than to any canonical phrase";
-                Ok(ForeignMask { mask: threshold(&relevancy, |r| r > 0.5), level: 0, rule })
+                Ok(threshold(relevancy, |r| r > 0.5, "more alike to the phrase than to any canonical phrase"))
             }
             Method::OpenGaussian => {
                 let of = self.result.levels.first().ok_or(ForeignError::Level(0))?;
                 let LevelValues::Clusters(clusters) = &of.values else { return Err(ForeignError::Level(0)) };
                 let chosen = leaves(clusters, phrase.query);
                 let inside = |i: usize| clusters.of[i].is_some_and(|c| chosen.contains(&(c as usize)));
-                let mask = silhouette(renderer, of, view, inside)?;
-                Ok(ForeignMask { mask, level: 0, rule: "best cluster and like ones of its root; silhouette over 0.7" })
+                let found = silhouette(renderer, of, view, inside)?;
+                Ok(covered(found, 0, "best cluster and like ones of its root; silhouette over 0.7"))
             }
             Method::Thgs => {
                 let levels = self.result.levels.len();
-                let mask = self.segments(renderer, view, phrase.query, levels.saturating_sub(2)..levels)?;
+                let found = self.segments(renderer, view, phrase.query, levels.saturating_sub(2)..levels)?;
                 let rule = "best 3 segments of the two coarse levels; membership over 0.5";
-                Ok(ForeignMask { mask, level: levels.saturating_sub(2), rule })
+                Ok(covered(found, levels.saturating_sub(2), rule))
             }
             Method::DrSplat => {
                 let of = self.result.levels.first().ok_or(ForeignError::Level(0))?;
                 let relevancy = self.gaussian_relevancy(0, phrase)?;
-                let mask = silhouette(renderer, of, view, |i| relevancy[i] > 0.5)?;
-                Ok(ForeignMask { mask, level: 0, rule: "Gaussians of relevancy over 0.5; silhouette over 0.7" })
+                let found = silhouette(renderer, of, view, |i| relevancy[i] > 0.5)?;
+                Ok(covered(found, 0, "Gaussians of relevancy over 0.5; silhouette over 0.7"))
             }
             Method::GaussianGrouping | Method::OmniSeg3d | Method::Saga => Err(ForeignError::NoLanguage(method.name())),
             Method::SplatDistiller | Method::Ludvig => Err(ForeignError::NoRule(method.name())),
@@ -102,17 +104,13 @@ impl ForeignScene {
         phrase: ForeignPhrase<'_>,
     ) -> Result<ForeignMask, ForeignError> {
         let (w, h) = view.size();
-        let mut best: Option<(f32, usize, Vec<f32>)> = None;
+        let mut levels = Vec::with_capacity(self.result.levels.len());
         for level in 0..self.result.levels.len() {
-            let relevancy = self.pixel_relevancy(renderer, view, level, phrase)?;
-            let most = largest(&relevancy);
-            if best.as_ref().is_none_or(|(before, ..)| most > *before) {
-                best = Some((most, level, relevancy));
-            }
+            levels.push(self.pixel_relevancy(renderer, view, level, phrase)?);
         }
-        let (most, level, relevancy) = best.ok_or(ForeignError::Level(0))?;
-        let mask = Mask::from_fn(w, h, |i| on_lerfs_scale(relevancy[i], most) > LERFS_SHARE);
-        Ok(ForeignMask { mask, level, rule: "over 20 % of LERF's scale; level of the largest relevancy" })
+        let found = by_common_rule(&levels, w, h).ok_or(ForeignError::Level(0))?;
+        let LeveledMask { mask, level, values, peak } = found;
+        Ok(ForeignMask { mask, level, values, peak, rule: BY_COMMON_RULE })
     }
 
     /// Pixels whose blended membership in the best segments of these levels is over a half.
@@ -122,12 +120,14 @@ impl ForeignScene {
         view: &ForeignView,
         query: &[f32],
         levels: std::ops::Range<usize>,
-    ) -> Result<Mask, ForeignError> {
+    ) -> Result<(Mask, Vec<f32>), ForeignError> {
         let members = self.members(query, levels);
         let copy = |i: usize, _: usize, out: &mut [f32]| out.fill(f32::from(u8::from(members[i])));
-        let blended = blend::blend(renderer, &self.result.cloud, BlendSource { dim: 1, copy: &copy }, &view.camera)?;
+        let mut blended =
+            blend::blend(renderer, &self.result.cloud, BlendSource { dim: 1, copy: &copy }, &view.camera)?;
         let (w, h) = view.size();
-        Ok(Mask::from_fn(w, h, |i| blended.planes[0][i] > MEMBERSHIP))
+        let membership = blended.planes.swap_remove(0);
+        Ok((Mask::from_fn(w, h, |i| membership[i] > MEMBERSHIP), membership))
     }
 
     /// Returns for each Gaussian whether it is in one of the segments of these levels that are most alike to a phrase.
@@ -171,16 +171,16 @@ fn leaves(clusters: &ClusterLevel, query: &[f32]) -> Vec<usize> {
     chosen
 }
 
-/// Pixels that these Gaussians alone cover.
+/// Pixels that these Gaussians alone cover, and how much they do.
 fn silhouette(
     renderer: &mut Renderer,
     level: &ResultLevel,
     view: &ForeignView,
     inside: impl Fn(usize) -> bool,
-) -> Result<Mask, ForeignError> {
+) -> Result<(Mask, Vec<f32>), ForeignError> {
     let chosen: Vec<usize> = (0..level.cloud.len()).filter(|i| inside(*i)).collect();
     let alone = level.cloud.select(&chosen);
     let settings = RenderSettings { sh_degree: 0, ..RenderSettings::of_mode(alone.render_mode) };
     let frame = renderer.render(&alone, Features::NONE, &view.camera, &settings)?;
-    Ok(Mask::from_fn(frame.width_px, frame.height_px, |i| frame.alpha[i] > SILHOUETTE))
+    Ok((Mask::from_fn(frame.width_px, frame.height_px, |i| frame.alpha[i] > SILHOUETTE), frame.alpha))
 }
