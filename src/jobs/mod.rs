@@ -5,6 +5,7 @@
 
 pub(crate) mod batch;
 pub(crate) mod bench;
+pub(crate) mod camera_path;
 pub(crate) mod changed;
 pub(crate) mod clean;
 mod coco;
