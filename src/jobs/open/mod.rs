@@ -19,9 +19,7 @@ use crate::render::RenderSettings;
 use crate::scene::measurement::Measurement;
 use crate::scene::plan::used_degree;
 use crate::scene::resource_log::{self, ResourceKind};
-use crate::scene::{
-    Axes, Bounds, Camera, CameraPath, Dataset, GaussianCloud, HomeView, Machine, SceneFacts, SemanticMap,
-};
+use crate::scene::{Axes, Bounds, Camera, Dataset, GaussianCloud, HomeView, Machine, SceneFacts, SemanticMap};
 
 mod beside;
 mod received;
@@ -226,7 +224,7 @@ pub struct OpenedScene {
     /// Measurements that are kept with it.
     pub measurements: Vec<Measurement>,
     /// Camera path that is kept with it.
-    pub(crate) camera_path: Option<CameraPath>,
+    pub(crate) camera_path: Option<crate::scene::CameraPath>,
     /// The first view.
     pub home: HomeView,
     pub(crate) facts: SceneFacts,
@@ -361,8 +359,7 @@ fn photos(dataset: Dataset, folders: &Folders, observer: &mut dyn Observer) -> O
     let before = trained::is_scene(&out).then(|| trained::load(&out)).and_then(|loaded| match loaded {
         Ok(scene) => Some(scene),
         Err(e) => {
-            observer
-                .note(Severity::Warning, format!("Earlier training of these photos is not shown: {e}. Train again"));
+            observer.note(Severity::Warning, format!("Earlier training of these photos not shown: {e}. Train again"));
             None
         }
     });
