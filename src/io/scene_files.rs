@@ -17,10 +17,13 @@ pub const CHECKPOINT_FILE: &str = "checkpoint.bin";
 pub(crate) const SELECTION_FILE: &str = "selection_tree.safetensors";
 /// Measurements of the user.
 pub(crate) const MEASUREMENTS_FILE: &str = "measurements.json";
+/// Camera path of the user.
+pub(crate) const CAMERA_PATH_FILE: &str = "camera_path.json";
 /// Journal of a save that is decided and not yet carried out.
 pub(super) const JOURNAL: &str = ".fmlgs_commit.json";
 
-pub(crate) const FILES: [&str; 5] = [SCENE_FILE, CLOUD_FILE, MAP_FILE, CHECKPOINT_FILE, MEASUREMENTS_FILE];
+pub(crate) const FILES: [&str; 6] =
+    [SCENE_FILE, CLOUD_FILE, MAP_FILE, CHECKPOINT_FILE, MEASUREMENTS_FILE, CAMERA_PATH_FILE];
 
 /// Returns whether `folder` is a trained scene.
 pub fn is_scene(folder: &Path) -> bool {

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use super::held_out::held_out;
-use super::{JobError, Scene, export_splat, measurements, open};
+use super::{JobError, Scene, camera_path, export_splat, measurements, open};
 use crate::io::splat_format::SplatFormat;
 use crate::io::trained::{self, SceneInfo};
 use crate::io::{IoError, SceneFolder, files};
@@ -143,6 +143,7 @@ pub(crate) fn store(
     let state = held.save(&info, cloud, map)?;
     if let Some(folder) = &from.folder {
         measurements::carry_over(folder, [&from.cloud, cloud], &held)?;
+        camera_path::carry_over(folder, &held)?;
     }
     Ok(state)
 }

@@ -43,7 +43,14 @@ pub(crate) fn store(folder: &Path, base: &[Measurement], ours: &[Measurement]) -
     if !trained::is_scene(folder) {
         return Ok(false);
     }
-    let hold = || SceneFolder::hold(folder, "storing measurements");
+    let held = hold_soon(folder, "storing measurements")?;
+    held.save_measurements(&merged(base, ours, &load(folder)?))?;
+    Ok(true)
+}
+
+/// Holds a scene's folder, also if another program holds it for a moment.
+pub(super) fn hold_soon(folder: &Path, what: &str) -> Result<SceneFolder, IoError> {
+    let hold = || SceneFolder::hold(folder, what);
     let mut held = hold();
     for _ in 1..TRIES {
         if !matches!(held, Err(IoError::Busy { .. })) {
@@ -52,9 +59,7 @@ pub(crate) fn store(folder: &Path, base: &[Measurement], ours: &[Measurement]) -
         thread::sleep(Duration::from_millis(100));
         held = hold();
     }
-    let held = held?;
-    held.save_measurements(&merged(base, ours, &load(folder)?))?;
-    Ok(true)
+    held
 }
 
 /// Copies measurements from the scene in `from` into a scene made of it, without those that no longer hold.

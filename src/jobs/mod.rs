@@ -6,6 +6,7 @@
 pub(crate) mod ask_result;
 pub(crate) mod batch;
 pub(crate) mod bench;
+pub(crate) mod camera_path;
 pub(crate) mod changed;
 pub(crate) mod clean;
 mod coco;

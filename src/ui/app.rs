@@ -23,6 +23,7 @@ use super::panes::{
 };
 use super::state::{AppState, Tone};
 use super::stored_measurements::StoredMeasurements;
+use super::stored_path::StoredPath;
 use super::theme;
 use super::toasts::Toasts;
 use super::viewport::Viewport;
@@ -85,6 +86,7 @@ pub struct App {
     /// The conversation with the agent.
     pub(crate) chat: Chat,
     pub(super) measured: StoredMeasurements,
+    pub(super) stored_path: StoredPath,
     /// The last change by another program that the user was asked about, with the number of its scene.
     pub(super) seen_elsewhere: Option<(u64, ChangeElsewhere)>,
     pub(super) toasts: Toasts,
@@ -154,6 +156,7 @@ impl App {
             camera: CameraPane::default(),
             chat: Chat::default(),
             measured: StoredMeasurements::default(),
+            stored_path: StoredPath::default(),
             seen_elsewhere: None,
             toasts: Toasts::default(),
             last_frame: 0.0,

@@ -48,6 +48,8 @@ const TYPING_SECS: f64 = 1.0;
 struct Typing {
     /// Window time until which letters are no shortcuts, s.
     until: f64,
+    /// The same for letters typed while a dialog is open that has no field for them.
+    in_dialog_until: f64,
     /// The focused field, if text was typed into it since Enter; undo and redo then belong to it.
     unsent: Option<Id>,
     /// True if a field has the focus; `leaves` if Escape now ends that, so Escape is no shortcut.
@@ -57,8 +59,9 @@ struct Typing {
     in_vain: bool,
 }
 
-/// Updates the state of typing; once per frame, before other code takes keys.
-pub(crate) fn watch_typing(ctx: &egui::Context) {
+/// Updates the state of typing; once per frame, before other code takes keys. Space and Enter of text that is typed
+/// while a dialog without a field for it is open press none of its buttons.
+pub(crate) fn watch_typing(ctx: &egui::Context, has_dialog: bool) {
     let field = ctx.memory(|m| m.focused()).filter(|_| ctx.text_edit_focused());
     let typing = typing(ctx);
     let typing = ctx.input(|i| {
@@ -73,8 +76,18 @@ pub(crate) fn watch_typing(ctx: &egui::Context) {
             false => typing.until,
         };
         let leaves = typing.in_field && i.key_pressed(Key::Escape);
-        Typing { until, unsent, in_field: field.is_some(), leaves, ..typing }
+        let is_letter = |e: &Event| matches!(e, Event::Text(text) if !text.trim().is_empty());
+        let in_dialog_until = match has_dialog && field.is_none() {
+            true if i.events.iter().any(is_letter) => i.time + TYPING_SECS,
+            true if !i.pointer.any_pressed() && !i.key_pressed(Key::Tab) => typing.in_dialog_until,
+            _ => 0.0,
+        };
+        Typing { until, in_dialog_until, unsent, in_field: field.is_some(), leaves, ..typing }
     });
+    if ctx.input(|i| i.time) < typing.in_dialog_until {
+        let presses = |e: &Event| matches!(e, Event::Key { key: Key::Space | Key::Enter, pressed: true, .. });
+        ctx.input_mut(|i| i.events.retain(|e| !presses(e)));
+    }
     ctx.data_mut(|d| d.insert_temp(Id::NULL, typing));
 }
 

@@ -39,6 +39,7 @@ pub mod select_shape;
 mod short_names;
 pub(crate) mod state;
 mod stored_measurements;
+mod stored_path;
 mod text_field;
 pub(crate) mod theme;
 pub(crate) mod toasts;

@@ -8,6 +8,7 @@ use serde::{Deserialize, Deserializer};
 use super::{IoError, files};
 use crate::scene::{CameraPath, PathError};
 
+pub(crate) mod kept;
 pub(crate) mod nerfstudio;
 mod own;
 

@@ -2,6 +2,7 @@
 //!
 //! Poses as in [`PathKey`]: `world_from_camera` row by row, its columns right, down and forward.
 
+use std::io::{self, Write};
 use std::path::Path;
 
 use glam::{DMat3, DVec3};
@@ -54,6 +55,11 @@ fn keys<'de, D: Deserializer<'de>>(from: D) -> Result<Vec<Key>, D::Error> {
 /// [`IoError::Syntax`] names the key and field of a path that breaks a rule; [`IoError::Write`].
 pub fn write(path: &Path, camera_path: &CameraPath) -> Result<(), IoError> {
     camera_path.validate().map_err(|e| error(path, &e))?;
+    atomic::write(path, |out| encode(out, camera_path))
+}
+
+/// Encodes a valid camera path.
+pub(super) fn encode(out: &mut dyn Write, camera_path: &CameraPath) -> io::Result<()> {
     let file = File {
         format: FORMAT.into(),
         version: VERSION,
@@ -62,10 +68,8 @@ pub fn write(path: &Path, camera_path: &CameraPath) -> Result<(), IoError> {
         seconds: camera_path.seconds,
         keys: camera_path.keys.iter().map(Key::from).collect(),
     };
-    atomic::write(path, |out| {
-        serde_json::to_writer_pretty(&mut *out, &file)?;
-        out.write_all(b"\n")
-    })
+    serde_json::to_writer_pretty(&mut *out, &file)?;
+    out.write_all(b"\n")
 }
 
 /// Parses a path with the `version` of its head; its values are not checked yet.

@@ -7,7 +7,7 @@ use std::sync::Arc;
 use super::held_out::held_out;
 use super::runs::{self, RunSummary};
 use super::sparse_cloud::sparse_cloud;
-use super::{Folders, JobError, measurements, plan};
+use super::{Folders, JobError, camera_path, measurements, plan};
 use crate::io::gs_output::GsOutput;
 use crate::io::labels::Labels;
 use crate::io::results::{Method, MethodResult};
@@ -237,6 +237,8 @@ pub struct OpenedScene {
     pub out: PathBuf,
     /// Measurements that are kept with it.
     pub measurements: Vec<Measurement>,
+    /// Camera path that is kept with it.
+    pub(crate) camera_path: Option<crate::scene::CameraPath>,
     /// The first view.
     pub home: HomeView,
     pub(crate) facts: SceneFacts,
@@ -306,6 +308,7 @@ impl OpenedScene {
             trained: true,
             semantics,
             measurements: scene.folder.as_deref().map_or_else(Vec::new, |folder| measurements::known(folder, observer)),
+            camera_path: scene.folder.as_deref().and_then(|folder| camera_path::known(folder, observer)),
             out: scene.folder.clone().unwrap_or_default(),
             home,
             can_resume: has_checkpoint,
@@ -348,8 +351,7 @@ pub(crate) fn open(
     if let Some(text) = objects_elsewhere(&opened) {
         observer.note(Severity::Warning, text);
     }
-    let root = opened.dataset.as_ref().map(|d| d.root.clone());
-    opened.masks = root.filter(|root| Labels::open(root).is_ok());
+    opened.masks = opened.dataset.as_ref().map(|d| d.root.clone()).filter(|root| Labels::open(root).is_ok());
     opened.report_out = match opened.out.as_os_str().is_empty() {
         true => folders.report(path),
         false => opened.out.join("report"),
@@ -371,8 +373,7 @@ fn photos(dataset: Dataset, folders: &Folders, observer: &mut dyn Observer) -> O
     let before = trained::is_scene(&out).then(|| trained::load(&out)).and_then(|loaded| match loaded {
         Ok(scene) => Some(scene),
         Err(e) => {
-            observer
-                .note(Severity::Warning, format!("Earlier training of these photos cannot be shown: {e}. Train again"));
+            observer.note(Severity::Warning, format!("Earlier training of these photos not shown: {e}. Train again"));
             None
         }
     });

@@ -8,6 +8,7 @@ use glam::DVec3;
 
 use super::{JobError, Scene, export, video};
 use crate::io::page::{Page, PageIdentity, PagePath, PageQuestions, PageScene, PageView, packed};
+use crate::io::scene_files::CAMERA_PATH_FILE;
 use crate::io::{IoError, files};
 use crate::math::format::{self, things};
 use crate::math::rotation::nearest_rotation;
@@ -23,6 +24,8 @@ use crate::scene::{
     text,
 };
 
+/// Name of the camera path that is kept with a scene.
+pub(crate) const KEPT_PATH: &str = "Camera path";
 /// Endings of the page's file name.
 pub(crate) const ENDINGS: [&str; 2] = [".html", ".htm"];
 /// Poses of a camera path per second, and at most; the page interpolates neighbors.
@@ -105,6 +108,9 @@ pub(crate) fn paths_in(folder: &Path) -> Vec<(String, CameraPath)> {
 
 /// Reads a camera path from a file, with the file's name.
 pub(crate) fn named_path(file: &Path) -> Result<(String, CameraPath), IoError> {
+    if file.file_name().is_some_and(|name| name == CAMERA_PATH_FILE) {
+        return Ok((KEPT_PATH.to_owned(), video::camera_path(file)?));
+    }
     let stem = file.file_stem().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
     Ok((stem.trim_end_matches(".nerfstudio").to_owned(), video::camera_path(file)?))
 }

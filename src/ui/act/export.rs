@@ -70,8 +70,10 @@ pub(in crate::ui) fn page(app: &mut App) {
         }
         let mut paths = page_job::paths_in(&scene.out);
         let own = &app.camera.path;
+        // What is stored may be an earlier state.
+        paths.retain(|(name, _)| name != page_job::KEPT_PATH);
         if !own.keys.is_empty() && paths.iter().all(|(_, path)| path != own) {
-            paths.insert(0, ("Camera path".to_owned(), own.clone()));
+            paths.insert(0, (page_job::KEPT_PATH.to_owned(), own.clone()));
         }
         let info = JobInfo::long(format!("Writing {}", file_name(&out))).pausable();
         let request = PageRequest {

@@ -10,18 +10,28 @@ use crate::ui::layout::Layout;
 use crate::ui::state::{RunningJob, Tone};
 use crate::worker::Makes;
 
-/// Asks once before the window closes while a job runs. A job on another computer goes on there.
+/// Asks once before the window closes while a job runs; waits while a camera path or measurements are stored. A job on
+/// another computer goes on there.
 pub(in crate::ui) fn watch_close(app: &mut App, ctx: &Context) {
-    if app.quits {
+    let is_storing = app.stored_path.is_storing || app.measured.is_storing;
+    if app.quits && !is_storing {
         return ctx.send_viewport_cmd(ViewportCommand::Close);
     }
     let is_here = |job: &&RunningJob| !remote::is_remote(job.id) && !job.canceling && job.info.makes != Makes::Scene;
-    let Some(job) = app.state.job.as_ref().filter(is_here).filter(|_| ctx.input(|i| i.viewport().close_requested()))
-    else {
+    if !ctx.input(|i| i.viewport().close_requested()) {
+        return;
+    }
+    let Some(job) = app.state.job.as_ref().filter(is_here).filter(|_| !app.quits) else {
+        // What was changed last is stored in a moment.
+        if is_storing {
+            ctx.send_viewport_cmd(ViewportCommand::CancelClose);
+            app.quits = true;
+        }
         return;
     };
     ctx.send_viewport_cmd(ViewportCommand::CancelClose);
-    let text = format!("{} is still running. {}", job.info.title, job.leaves());
+    let unsaved = if app.stored_path.waits { " The camera path is stored once it has ended." } else { "" };
+    let text = format!("{} is still running. {}{unsaved}", job.info.title, job.leaves());
     let question = Question { text, yes: "Quit", other: None, no: "Keep running", deletes: false };
     app.put_question(question, |app, answer| app.quits = answer == DialogAnswer::Yes);
 }

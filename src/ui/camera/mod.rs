@@ -10,6 +10,7 @@ use std::collections::VecDeque;
 use std::path::Path;
 
 use egui::{Align, Button, Checkbox, ComboBox, DragValue, Layout, RichText, ScrollArea, Ui, vec2};
+use glam::DVec3;
 
 use self::player::{Clip, Player};
 use self::repeated::RepeatedPath;
@@ -43,7 +44,7 @@ pub(crate) struct CameraPane {
     /// Name of the target of the flight that plays.
     flight_to: String,
     /// Number of the scene that the path belongs to.
-    scene: u64,
+    pub(crate) scene: u64,
     /// The path that was set to repeat last.
     repeated: Option<RepeatedPath>,
 }
@@ -77,10 +78,10 @@ fn empty() -> CameraPath {
 }
 
 impl CameraPane {
-    /// Forgets the path of another scene.
-    pub(crate) fn on_scene(&mut self, scene: u64) {
+    /// Replaces the path of another scene by the one that is kept with this scene.
+    pub(crate) fn on_scene(&mut self, scene: u64, kept: Option<&CameraPath>) {
         if self.scene != scene {
-            *self = Self { scene, ..Self::default() };
+            *self = Self { scene, path: kept.cloned().unwrap_or_else(empty), ..Self::default() };
         }
     }
 
@@ -220,11 +221,12 @@ impl CameraPane {
         Some((cameras, settings))
     }
 
-    /// The loaded clip and the keyframes, for drawing them into the view.
-    pub(crate) fn route(&self) -> CameraRoute {
+    /// The loaded clip and the keyframes, for drawing them into the view of a camera at `eye`.
+    pub(crate) fn route(&self, eye: DVec3) -> CameraRoute {
         let last = 120;
         let at = |clip: &Clip, i: i32| clip.at(clip.seconds() * f64::from(i) / f64::from(last)).map(|p| p.center);
-        let way = self.player.clip().map(|clip| (0..=last).filter_map(|i| at(clip, i)).collect()).unwrap_or_default();
+        let clip = self.player.shown_from(eye);
+        let way = clip.map(|clip| (0..=last).filter_map(|i| at(clip, i)).collect()).unwrap_or_default();
         let keys = self.path.keys.iter().enumerate().map(|(i, k)| (k.center, self.selected == Some(i))).collect();
         CameraRoute { way, keys, show_reach: self.show_reach, plays: self.player.playing }
     }

@@ -1,5 +1,7 @@
 //! Playback of a flight or a path, with its frame rate.
 
+use glam::DVec3;
+
 use crate::navigate::{CameraSpline, CameraTrajectory, Pose};
 
 /// Window of the frame rate, s.
@@ -74,6 +76,18 @@ impl Player {
 
     pub(crate) fn clip(&self) -> Option<&Clip> {
         self.clip.as_ref()
+    }
+
+    /// The clip, if its way is drawn into the view of a camera at `eye`: a flight only on the way, not once it has ended
+    /// or the camera has left it.
+    pub(crate) fn shown_from(&self, eye: DVec3) -> Option<&Clip> {
+        self.clip.as_ref().filter(|clip| match clip {
+            Clip::Path(_) => true,
+            Clip::Flight(flight) => {
+                let is_on_way = |pose: Pose| pose.center.distance(eye) <= 1e-3 * flight.length;
+                self.time < flight.seconds && clip.at(self.time).is_some_and(is_on_way)
+            }
+        })
     }
 
     /// Starts or stops; restarts at the end.
@@ -151,6 +165,17 @@ mod tests {
         assert!(p.playing && p.time < 2.0);
         assert_eq!(p.seek(99.0).map(|p| p.center.x), Some(10.0));
         assert!(!p.playing);
+    }
+
+    #[test]
+    fn the_way_of_a_flight_is_shown_only_on_it() {
+        let mut p = Player::default();
+        p.load(clip(), true);
+        let here = p.seek(1.0).expect("a pose").center;
+        assert!(p.shown_from(here).is_some(), "stopped on the way");
+        assert!(p.shown_from(here + DVec3::Y).is_none(), "another move of the camera");
+        let end = p.seek(2.0).expect("a pose").center;
+        assert!(p.shown_from(end).is_none() && p.clip().is_some(), "it has ended, and can be played again");
     }
 
     #[test]

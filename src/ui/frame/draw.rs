@@ -96,7 +96,7 @@ fn show_view(app: &mut App, ui: &mut Ui) {
     let rect = ui.available_rect_before_wrap();
     let vain = app.state.why_no_query().filter(|_| app.asks_in_vain);
     let App { state, layout, tasks, thumbnails, actions, viewport, camera, first_page, .. } = app;
-    let route = layout.shows(Pane::Camera).then(|| camera.route());
+    let route = layout.shows(Pane::Camera).then(|| camera.route(viewport.pose().center));
     let has_scene = state.scene.is_some();
     let mut cx = Ctx { state, layout, tasks, thumbnails, actions };
     match has_scene {

@@ -12,15 +12,16 @@ use crate::ui::keys;
 
 /// Takes keys and dropped files, before anything is drawn.
 pub(super) fn take(app: &mut App, ctx: &Context) {
-    keys::watch_typing(ctx);
-    let has_dialog = app.state.error.is_some()
+    let has_other_dialog = app.state.error.is_some()
         || app.state.unposed.is_some()
         || app.question.is_some()
         || app.find_dialog.is_open()
         || app.export_dialog.is_some()
         || app.asks_for_video
-        || app.keep_dialog.is_some()
-        || app.dialogs.is_own_open();
+        || app.keep_dialog.is_some();
+    // The window's file dialog takes letters itself.
+    let has_dialog = has_other_dialog || app.dialogs.is_own_open();
+    keys::watch_typing(ctx, has_other_dialog && !app.dialogs.is_own_open());
     // An open menu takes the keys; Escape closes only the menu.
     let has_menu = egui::Popup::is_any_open(ctx);
     if has_menu && !app.dialogs.is_own_open() && ctx.input_mut(|i| i.consume_key(Modifiers::NONE, Key::Escape)) {

@@ -5,7 +5,7 @@ mod input;
 
 use egui::Ui;
 
-use super::act::{act, edits, elsewhere, measure, query, remote, view, window};
+use super::act::{act, camera_path, edits, elsewhere, measure, query, remote, view, window};
 use super::actions::Pane;
 use super::app::App;
 use super::state::Tone;
@@ -35,6 +35,7 @@ impl eframe::App for App {
         edits::settle(self, at_rest);
         if at_rest {
             measure::keep_up(self);
+            camera_path::keep_up(self);
         }
     }
 
@@ -69,7 +70,7 @@ fn take_news(app: &mut App, ctx: &egui::Context) {
     let chosen = app.clean.update(cloud, app.layout.shows(Pane::Clean));
     let marked = if app.viewport.is_selecting() { app.viewport.marked() } else { chosen };
     app.viewport.visibility.set_chosen(marked);
-    app.camera.on_scene(app.state.scene_number);
+    app.camera.on_scene(app.state.scene_number, app.state.scene.as_ref().and_then(|scene| scene.camera_path.as_ref()));
     for effect in app.chat.news() {
         edits::settle(app, false);
         query::effect(app, effect);

@@ -209,7 +209,7 @@ impl Display {
     pub(super) fn picked(&self, at: DVec2, eye: &Eye) -> Option<DVec3> {
         let picture = self.picture()?;
         // A frame from another position does not apply here.
-        if picture.camera.center.distance(eye.center) > 1e-3 * eye.distance() {
+        if !eye.is_at(picture.camera.center) {
             return None;
         }
         let size = DVec2::new(f64::from(picture.camera.width_px), f64::from(picture.camera.height_px));
@@ -257,12 +257,12 @@ fn report(failure: &Failure) -> String {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
     use crate::scene::Bounds;
 
     /// A frame of 4 x 4 px from `eye`, with depth 2 except at its first pixel.
-    fn frame(ticket: u64, eye: &Eye) -> ViewPicture {
+    pub(in super::super) fn frame(ticket: u64, eye: &Eye) -> ViewPicture {
         let mut depth = vec![2.0; 16];
         depth[0] = 0.0;
         ViewPicture {

@@ -66,6 +66,11 @@ impl Eye {
         (point - self.center).dot(self.forward()) > 0.0
     }
 
+    /// True if it is, nearly, at this place: what was drawn from there applies.
+    pub(crate) fn is_at(&self, place: DVec3) -> bool {
+        place.distance(self.center) <= 1e-3 * self.distance()
+    }
+
     /// Distance to the pivot, never 0.
     pub(crate) fn distance(&self) -> f64 {
         self.center.distance(self.pivot).max(1e-9)

@@ -258,7 +258,11 @@ impl Viewport {
         if rests < 0.0 {
             ui.ctx().request_repaint_after_secs((-rests + 0.01) as f32);
         }
-        let busy = state.job.as_ref().is_some_and(|j| !j.paused);
+        // While another job needs the processor, depth is drawn only for a tool; of a training, which changes the scene
+        // all the time, only once a click waits for it.
+        let tool_waits = self.tool.as_mut().is_some_and(|tool| tool.as_dyn().waits_for_depth());
+        let needs_depth = tool_waits || self.is_measuring() && !state.is_training();
+        let busy = state.job.as_ref().is_some_and(|j| !j.paused) && !needs_depth;
         let budget = match (rests < 0.0, busy) {
             (true, _) => QualityBudget::Moving,
             (false, true) => QualityBudget::Shared,

@@ -9,8 +9,8 @@ use egui_kittest::kittest::{NodeT, Queryable};
 use fmlgs::ui::actions::Action;
 use fmlgs::ui::app::App;
 
-use super::Window;
 use super::edits::window;
+use super::{Window, write_splat};
 
 fn names(app: &App) -> Vec<String> {
     app.viewport.measurements.iter().map(|m| m.name.clone()).collect()
@@ -120,6 +120,87 @@ fn points_are_put_taken_back_and_left() {
     click_view(&mut w, first);
     w.press(Key::Escape);
     assert!(!w.shows("Undo point") && names(w.app()).len() == 1, "Escape leaves what is not finished");
+}
+
+#[test]
+fn a_click_while_a_job_runs_waits_for_depth_and_finds_its_surface() {
+    let folder = tempfile::tempdir().expect("folder");
+    let mut w = window(folder.path());
+    let disabled = |w: &Window| w.harness.get_by_label("Undo point").accesskit_node().is_disabled();
+    let depth = |w: &mut Window| {
+        for _ in 0..3_000 {
+            if !w.shows("Waiting for the depth") {
+                return;
+            }
+            w.harness.step();
+            std::thread::sleep(std::time::Duration::from_millis(10));
+        }
+        panic!("the depth has not come");
+    };
+    w.press(Key::M);
+    let places = (-4..=4).flat_map(|x| (-3..=2).map(move |y| [0.08 * x as f32, 0.08 * y as f32]));
+    let mut is_hit = |share: &[f32; 2]| {
+        click_view(&mut w, *share);
+        depth(&mut w);
+        !disabled(&w)
+    };
+    let all: Vec<[f32; 2]> = places.collect();
+    let hit = *all.iter().find(|share| is_hit(share)).expect("a surface");
+    let missed = all.iter().any(|share| {
+        click_view(&mut w, *share);
+        depth(&mut w);
+        w.shows("No surface there")
+    });
+    assert!(missed, "control: beside the boxes there is none");
+    w.press(Key::Escape);
+    let layout = &mut w.harness.state_mut().layout;
+    (layout.finding.max_seeds, layout.finding.encoder) = (1, Some("none".into()));
+    w.ask(Action::FindObjects);
+    w.until("a job", |a| a.state.job.is_some());
+    w.press(Key::M);
+    click_view(&mut w, hit);
+    depth(&mut w);
+    assert!(!disabled(&w) && !w.shows("No surface there"));
+    w.ask(Action::Cancel);
+    w.until("the end", |a| a.state.job.is_none());
+}
+
+#[test]
+fn the_camera_path_stays_with_its_scene_and_a_damaged_one_is_left_alone() {
+    let folder = tempfile::tempdir().expect("folder");
+    let mut w = window(folder.path());
+    let (scene, file) = (folder.path().join("scene"), folder.path().join("scene/camera_path.json"));
+    let text = || std::fs::read_to_string(&file).unwrap_or_default();
+    let stored = || text().matches("\"center\"").count();
+    let keys = |w: &Window, n: usize| {
+        let has = |i: usize| w.harness.query_by_label(&format!("Keyframe {i}")).is_some();
+        (n == 0 || has(n)) && !has(n + 1)
+    };
+    w.ask(Action::AddKey);
+    w.ask(Action::AddKey);
+    w.until("both are stored", |_| stored() == 2);
+    undo(&mut w);
+    w.until("what is undone is stored, too", |_| stored() == 1);
+    w.ask(Action::AddKey);
+    w.until("again", |_| stored() == 2);
+    w.ask(Action::Open(write_splat(folder.path())));
+    w.until("another scene", |a| a.state.scene.as_ref().is_some_and(|s| s.name == "dots"));
+    w.harness.run_steps(3);
+    assert!(keys(&w, 0), "control: the path is not that of every scene");
+    w.ask(Action::Open(scene.clone()));
+    w.until("the boxes", |a| a.state.scene.as_ref().is_some_and(|s| s.out == scene));
+    w.harness.run_steps(3);
+    assert!(keys(&w, 2), "opening the scene brings it back");
+    drop(w);
+
+    std::fs::write(&file, "{").expect("written");
+    let says = |a: &App, text: &str| a.state.log.iter().any(|line| line.text.contains(text));
+    let mut again = Window::keeping(folder.path().join("data"), Some(Action::Open(scene)));
+    again.until("a picture", |a| a.viewport.picture().is_some_and(|p| p.full));
+    assert!(says(again.app(), "The camera path is not shown"));
+    again.ask(Action::AddKey);
+    again.until("it is told", |a| says(a, "kept in this window only"));
+    assert_eq!(text(), "{", "never replaced");
 }
 
 #[test]

@@ -183,6 +183,42 @@ fn while_training_runs_no_letter_pauses_it() {
 }
 
 #[test]
+fn while_a_question_is_open_no_letter_acts_and_no_sentence_answers_it() {
+    let data = tempfile::tempdir().expect("folder");
+    let mut w = Window::keeping(data.path().join("data"), Some(Action::Open(photos())));
+    w.until("the photos", |a| a.state.scene.is_some());
+    w.harness.state_mut().layout.config.steps = 50_000;
+    w.ask(Action::StartTraining);
+    w.until("training", |a| a.state.history.steps.len() > 2);
+    w.press(Key::Escape);
+    assert!(w.shows("Keep running"), "it asks");
+    let home = center(&w);
+    let enter = vec![key(Key::Enter, true, Modifiers::NONE), key(Key::Enter, false, Modifiers::NONE)];
+    at_once(&mut w, [slash(), letters("what is bigger than the top"), enter.clone(), letters("one two")]);
+    assert!(w.shows("Keep running"), "its spaces and Enter press nothing");
+    w.types("/both of two ");
+    at_once(&mut w, [enter.clone()]);
+    assert!(w.shows("Keep running"), "letter by letter");
+    assert!(!w.shows("Fit scene") && !w.app().viewport.is_orthographic() && center(&w) == home);
+    assert!(w.app().state.job.as_ref().is_some_and(|j| !j.paused));
+    let chat = w.harness.query_by_role_and_label(Role::TextInput, "Chat box");
+    assert!(chat.is_none_or(|field| field.accesskit_node().value().is_none_or(|text| text.is_empty())));
+    // The control: once it is closed they act, and Enter alone answers a question.
+    w.press(Key::Escape);
+    assert!(!w.shows("Keep running"));
+    w.press(Key::B);
+    w.harness.run_steps(2);
+    assert!(w.shows("Fit scene"), "the crop box");
+    w.press(Key::Escape);
+    w.press(Key::Escape);
+    assert!(w.shows("Keep running"));
+    at_once(&mut w, [enter]);
+    assert!(!w.shows("Keep running") && w.app().state.is_training());
+    w.ask(Action::Cancel);
+    w.until("the end", |a| a.state.job.is_none());
+}
+
+#[test]
 fn what_is_typed_in_the_frame_of_its_key_is_for_the_palette_the_name_and_the_chat() {
     let folder = tempfile::tempdir().expect("folder");
     let mut w = edits::window(folder.path());

@@ -113,6 +113,11 @@ pub(super) trait ViewTool {
         false
     }
 
+    /// True if a click or a line waits for a frame with depth.
+    fn waits_for_depth(&self) -> bool {
+        false
+    }
+
     /// Takes over results of jobs and begins the next, once per frame.
     fn update(&mut self, _scene: &mut ToolScene<'_>, _state: &mut AppState, _tasks: &Tasks) {}
 

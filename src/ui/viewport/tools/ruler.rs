@@ -1,15 +1,18 @@
 //! Measuring in the view: clicks put points on surfaces, which make a length, an angle or an area; of a selected object
 //! the upright box is measured. A length sets the scene's scale, an area the floor.
 
-use egui::{Button, Key, Pos2, Response, RichText, ScrollArea, TextEdit, Ui};
+use egui::{Button, Key, Response, RichText, ScrollArea, TextEdit, Ui};
 use glam::{DVec2, DVec3};
 
+use super::super::display::Display;
+use super::super::eye::Eye;
 use super::super::measured::DrawnMeasurement;
 use super::super::split::ViewArea;
 use super::card::ToolCard;
 use super::{CardPlaces, ToolScene, ViewTool};
 use crate::math::format;
 use crate::math::geometry::GeometryFault;
+use crate::navigate::Pose;
 use crate::scene::measurement::{MeasuredValue, Measurement, MeasurementKind, free_name};
 use crate::scene::upright_box::UprightBox;
 use crate::scene::{SemanticMap, text};
@@ -18,6 +21,7 @@ use crate::ui::ctx::Ctx;
 use crate::ui::state::AppState;
 use crate::ui::{keys, theme};
 use crate::worker::Versioned;
+use crate::worker::view::ViewPicture;
 
 /// Height of the list of kept measurements, points.
 const LIST_PT: f32 = 96.0;
@@ -29,13 +33,16 @@ pub(crate) struct Ruler {
     points: Vec<DVec3>,
     /// The true length, as typed.
     known: String,
+    /// Clicks that wait for the depth of the view: its pose, and their places relative to the frame.
+    waiting: Vec<(Pose, DVec2)>,
     /// True if the last click met no surface.
     missed: bool,
 }
 
 impl Default for Ruler {
     fn default() -> Self {
-        Self { kind: MeasurementKind::Length, points: Vec::new(), known: String::new(), missed: false }
+        let (kind, points, waiting) = (MeasurementKind::Length, Vec::new(), Vec::new());
+        Self { kind, points, known: String::new(), waiting, missed: false }
     }
 }
 
@@ -45,6 +52,28 @@ impl Ruler {
             self.points.clear();
         }
         self.points.push(point);
+    }
+
+    /// Puts the points of waiting clicks once the depth of their view is drawn; those of a view that was left are
+    /// forgotten.
+    fn put_waiting(&mut self, display: &Display, eye: &Eye, pose: Pose) {
+        self.waiting.retain(|(from, _)| *from == pose);
+        let has_depth = |p: &ViewPicture| p.median_depth.is_some() && eye.is_at(p.camera.center);
+        if self.waiting.is_empty() || !display.picture().is_some_and(has_depth) {
+            return;
+        }
+        for (_, at) in std::mem::take(&mut self.waiting) {
+            let point = display.picked(at, eye);
+            self.missed = point.is_none();
+            point.into_iter().for_each(|point| self.put(point));
+        }
+    }
+
+    /// Takes the last click back.
+    fn take_back(&mut self) {
+        if self.waiting.pop().is_none() {
+            self.points.pop();
+        }
     }
 
     /// Points of the measurement: those that were put, or those of the selected object's box.
@@ -92,6 +121,9 @@ impl Ruler {
     /// What to do next, or the value.
     fn says(&self, value: Result<MeasuredValue, GeometryFault>, state: &AppState) -> String {
         let meters = meters_per_unit(state);
+        if !self.waiting.is_empty() {
+            return "Waiting for the depth of this view\u{2026}".to_owned();
+        }
         if self.missed && self.kind != MeasurementKind::Box {
             return "No surface there: click again".to_owned();
         }
@@ -119,7 +151,7 @@ impl Ruler {
                     MeasurementKind::Box => "Edges and volume of the upright box around the selected object.",
                 };
                 if ui.selectable_value(&mut self.kind, kind, kind.text()).on_hover_text(tip).changed() {
-                    (self.points, self.missed) = (Vec::new(), false);
+                    (self.points, self.waiting, self.missed) = (Vec::new(), Vec::new(), false);
                 }
             }
             ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
@@ -164,18 +196,18 @@ impl ViewTool for Ruler {
         self.kind != MeasurementKind::Box
     }
 
-    /// Puts a point on the surface under a click.
+    fn waits_for_depth(&self) -> bool {
+        !self.waiting.is_empty()
+    }
+
+    /// Puts a point on the surface under a click, once its depth is known.
     fn pointer(&mut self, response: &Response, area: ViewArea, scene: &mut ToolScene<'_>, _cx: &mut Ctx<'_>) {
-        let surface = |pos: Pos2| {
-            let at = (pos - area.shown.min) / area.shown.size();
-            scene.display.picked(DVec2::new(f64::from(at.x), f64::from(at.y)), scene.eye)
-        };
         let clicked = response.interact_pointer_pos().filter(|pos| response.clicked() && area.shown.contains(*pos));
         if let Some(pos) = clicked.filter(|_| self.takes_clicks()) {
-            let point = surface(pos);
-            self.missed = point.is_none();
-            point.into_iter().for_each(|point| self.put(point));
+            let at = (pos - area.shown.min) / area.shown.size();
+            self.waiting.push((scene.pose, DVec2::new(f64::from(at.x), f64::from(at.y))));
         }
+        self.put_waiting(scene.display, scene.eye, scene.pose);
     }
 
     /// Draws kinds, value and kept measurements.
@@ -201,13 +233,13 @@ impl ViewTool for Ruler {
                 if keep.on_disabled_hover_text("There is nothing to keep yet.").clicked() {
                     cx.ask(Action::KeepMeasurement);
                 }
-                let has_points = !self.points.is_empty();
+                let has_points = !self.points.is_empty() || !self.waiting.is_empty();
                 let back = ui.add_enabled(has_points, Button::new("Undo point")).on_hover_text("Backspace");
                 if back.clicked() {
-                    self.points.pop();
+                    self.take_back();
                 }
                 if ui.add_enabled(has_points, Button::new("Clear")).clicked() {
-                    self.points.clear();
+                    (self.points, self.waiting) = (Vec::new(), Vec::new());
                 }
                 if let Ok(value) = &value {
                     self.uses(ui, value, scene.eye.center, cx);
@@ -215,7 +247,7 @@ impl ViewTool for Ruler {
             });
         });
         if !keys::is_typing(ui.ctx()) && ui.input(|i| i.key_pressed(Key::Backspace)) {
-            self.points.pop();
+            self.take_back();
         }
     }
 }
@@ -271,7 +303,12 @@ fn meters_per_unit(state: &AppState) -> Option<f64> {
 
 #[cfg(test)]
 mod tests {
+    use std::sync::Arc;
+
+    use super::super::super::display::tests::frame;
     use super::*;
+    use crate::scene::Bounds;
+    use crate::worker::Slot;
 
     fn value(ruler: &Ruler) -> Result<MeasuredValue, GeometryFault> {
         ruler.kind.value(&ruler.points)
@@ -295,6 +332,30 @@ mod tests {
         assert_eq!(ruler.scale(), Some(0.25), "of the whole line");
         ruler.put(DVec3::new(1.0, 4.0, 0.0));
         assert_eq!((value(&ruler), ruler.scale()), (Err(GeometryFault::SamePoints), None));
+    }
+
+    #[test]
+    fn a_click_waits_for_the_depth_of_its_view() {
+        let ctx = egui::Context::default();
+        let eye = Eye::framing(&Bounds { min: DVec3::NEG_ONE, max: DVec3::ONE }, DVec3::Z);
+        let pose = Pose { center: eye.center, world_from_camera: eye.world_from_eye, fov_y_rad: eye.fov_y_rad };
+        let (mut display, pictures, mut ruler) = (Display::default(), Slot::default(), Ruler::default());
+        let mut click = |ruler: &mut Ruler, picture: Option<ViewPicture>, clicked: Option<(Pose, DVec2)>| {
+            if let Some(picture) = picture {
+                pictures.publish(Ok(Arc::new(picture)));
+                display.take(&ctx, &pictures);
+            }
+            ruler.waiting.extend(clicked);
+            ruler.put_waiting(&display, &eye, pose);
+            (ruler.points.len(), ruler.waits_for_depth(), ruler.missed)
+        };
+        let (surface, nothing) = (DVec2::splat(0.625), DVec2::splat(0.1));
+        let coarse = ViewPicture { median_depth: None, full: false, ..frame(1, &eye) };
+        assert_eq!(click(&mut ruler, Some(coarse), Some((pose, surface))), (0, true, false), "no depth yet");
+        assert_eq!(click(&mut ruler, Some(frame(2, &eye)), None), (1, false, false), "it has come");
+        let elsewhere = Pose { center: pose.center + DVec3::X, ..pose };
+        assert_eq!(click(&mut ruler, None, Some((elsewhere, surface))), (1, false, false), "of a view that was left");
+        assert_eq!(click(&mut ruler, None, Some((pose, nothing))), (1, false, true), "control: nothing is there");
     }
 
     #[test]

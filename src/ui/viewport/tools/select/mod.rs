@@ -321,6 +321,10 @@ impl ViewTool for SelectTool {
         true
     }
 
+    fn waits_for_depth(&self) -> bool {
+        self.line.is_some()
+    }
+
     fn update(&mut self, scene: &mut ToolScene<'_>, state: &mut AppState, tasks: &Tasks) {
         self.take_result();
         if let Some(cloud) = scene.cloud {
