@@ -165,7 +165,7 @@ fn status(tool: &SelectTool, ui: &mut Ui, scene: &ToolScene<'_>, cx: &Ctx<'_>) {
             "Preparing\u{2026}".to_owned()
         }
         Some(s) if s.id != NO_IDENTITY => {
-            format!("{}, {:.0} ms", format::things(s.gaussians.len(), "Gaussian"), s.ms)
+            format::things(s.gaussians.len(), "Gaussian")
         }
         Some(_) => "Nothing is selected".to_owned(),
         None => String::new(),
