@@ -16,6 +16,7 @@ use std::collections::VecDeque;
 use self::example::example;
 use self::form::{FormItem, FormRequest, Slots, Things, beginning_with, sequences};
 use self::halves::SEPARATORS;
+pub(crate) use self::nearest::nearest;
 use self::task::{CommandStep, task};
 use super::camera_args::{CLOSENESS, CLOSER, Direction, Distance, FARTHER, NORMAL};
 use super::dialog::DialogState;

@@ -10,8 +10,8 @@ use crate::jobs::select::empty_map;
 use crate::math::format;
 use crate::pipeline::observer::Observer;
 use crate::pipeline::semantics::lifting::edit::Edit;
-use crate::scene::Identities;
 use crate::scene::identity::whole_names::BETWEEN;
+use crate::scene::{Identities, Level};
 use crate::ui::app::App;
 use crate::ui::context::SceneContext;
 use crate::ui::history::{EditSnapshot, EditStep, Editing, ViewState, edit_text, splat_edit_text};
@@ -149,9 +149,12 @@ fn record(app: &mut App, editing: Editing) {
         return;
     };
     let before = app.state.changes.now().and_then(|now| now.map.clone());
-    let (mut emptied, mut is_new) = (Vec::new(), false);
+    let (mut emptied, mut by) = (Vec::new(), "It");
     if let (Some(old), Some(new)) = (before, map) {
-        is_new = old.identities.len() < new.identities.len();
+        if old.identities.len() < new.identities.len() {
+            let is_part = new.identities.iter().last().is_some_and(|(_, new)| new.level == Level::Part);
+            by = if is_part { "The new part" } else { "The new object" };
+        }
         if old.identities.len() > new.identities.len() {
             app.viewport.visibility.renumber(&old.identities, &new.identities);
         } else {
@@ -163,7 +166,6 @@ fn record(app: &mut App, editing: Editing) {
         let copy = app.state.copied.take().map(|name| format!(". Changes go to a copy, \u{201c}{name}\u{201d}."));
         app.state.toast(Tone::Good, sentence(&what) + &copy.unwrap_or_default());
         if !emptied.is_empty() {
-            let by = if is_new { "The new one" } else { "It" };
             let text = format!("{by} took all Gaussians of {}. Undo brings them back.", together(&emptied));
             app.state.toast(Tone::Warning, text);
         }

@@ -257,8 +257,9 @@ pub(in crate::ui) fn submit_removal(app: &mut App, request: RemoveRequest) {
         return;
     }
     let all = if request.retrain { phases::RETRAINING } else { phases::REMOVAL };
-    let of = app.state.semantics.as_deref().map(|map| removal::names(map, &request.options.ids));
-    let info = JobInfo::long(format!("Removing {}", of.unwrap_or_default())).pausable().phases(all);
+    let (ids, map) = (request.options.ids.iter(), app.state.semantics.as_deref());
+    let names: Vec<String> = ids.filter_map(|id| Some(map?.identities.full_name(*id))).collect();
+    let info = JobInfo::long(format!("Removing {}", names.join(", "))).pausable().phases(all);
     let remove = move |observer: &mut dyn Observer| removal::run_request(&request, observer);
     app.start_in_scene(info, remove, |app, removed| {
         let Some(removed) = removed else { return };

@@ -9,13 +9,7 @@ use crate::ui::object_menu;
 use crate::ui::viewport::visible::Visibility;
 
 /// Draws the menu of an identity, or of the view without one.
-pub(super) fn show(
-    ui: &mut Ui,
-    all: &Identities,
-    id: Option<IdentityId>,
-    visibility: &Visibility,
-    cx: &mut Ctx<'_>,
-) {
+pub(super) fn show(ui: &mut Ui, all: &Identities, id: Option<IdentityId>, visibility: &Visibility, cx: &mut Ctx<'_>) {
     if let Some(id) = id.filter(|id| all.get(*id).is_some()) {
         let is_hidden = visibility.draws(all, id) == Some(false);
         return object_menu::show(ui, all, id, is_hidden, cx);
