@@ -214,7 +214,7 @@ fn choice(request: &FormRequest<'_>) -> Option<String> {
         return None;
     }
     let raw: Vec<&str> = request.tokens.iter().map(|t| t.raw.as_str()).collect();
-    let text = raw.join(" ").replace(" 's", "'s").replace(" ,", ",");
+    let text = raw.join(" ").replace(" 's", "'s").replace(" ,", ",").replace(" ?", "?");
     request.known.asks_which(&text).then_some(text)
 }
 
