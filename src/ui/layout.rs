@@ -209,7 +209,8 @@ mod tests {
 
     #[test]
     fn a_layout_comes_back_as_it_was_saved() {
-        let mut layout = Layout { split: 0.25, recent: vec!["a/b".into()], ..Layout::default() };
+        let recent = vec!["a/b".into()];
+        let mut layout = Layout { split: 0.25, recent, export: SplatFormat::Spz, ..Layout::default() };
         layout.toggle(Pane::Dataset);
         let mut storage = Memory::default();
         layout.save(&mut storage);
