@@ -11,7 +11,7 @@ use crate::math::format;
 use crate::pipeline::observer::Observer;
 use crate::pipeline::semantics::lifting::edit::Edit;
 use crate::scene::identity::whole_names::BETWEEN;
-use crate::scene::{Identities, Level};
+use crate::scene::{Identities, IdentityId, Level};
 use crate::ui::app::App;
 use crate::ui::context::SceneContext;
 use crate::ui::history::{EditSnapshot, EditStep, Editing, ViewState, edit_text, splat_edit_text};
@@ -152,7 +152,8 @@ fn record(app: &mut App, editing: Editing) {
     let (mut emptied, mut by) = (Vec::new(), "It");
     if let (Some(old), Some(new)) = (before, map) {
         if old.identities.len() < new.identities.len() {
-            let is_part = new.identities.iter().last().is_some_and(|(_, new)| new.level == Level::Part);
+            let is_part =
+                new.identities.get(new.identities.len() as IdentityId).is_some_and(|i| i.level == Level::Part);
             by = if is_part { "The new part" } else { "The new object" };
         }
         if old.identities.len() > new.identities.len() {
