@@ -242,7 +242,10 @@ pub(crate) fn perform(
         dialog.moved = Some(call.clone());
     }
     let (text, refused) = match done {
-        Ok(text) => (if note.is_empty() { text } else { format!("{text} {note}") }, None),
+        Ok(text) if note.is_empty() => (text, None),
+        // What was asked is answered first.
+        Ok(text) if matches!(call, ToolCall::Locate { .. }) => (format!("{note} {text}"), None),
+        Ok(text) => (format!("{text} {note}"), None),
         Err(refusal) => (refusal.text, Some(refusal.kind)),
     };
     if id != NO_IDENTITY {

@@ -95,8 +95,11 @@ pub(super) fn measure(
             let free = describe::space(world).gap(id, other).unwrap_or(0.0);
             let middle = own.center().distance(bounds.center());
             let name = the(world, other);
-            let free = if free > 0.0 { format!("{} apart", length(world, free)) } else { "touching".into() };
-            format!("{it} is {} from {name}, middle to middle ({free}).", length(world, middle))
+            let free = match free > 0.0 {
+                true => format!("{} between the nearest points", length(world, free)),
+                false => "touching".to_owned(),
+            };
+            format!("{it} and {name}: {} between the middles, {free}.", length(world, middle))
         }
     })
 }

@@ -52,6 +52,11 @@ impl<'a> NameWords<'a> {
         self.whole.get(&said).map(String::as_str)
     }
 
+    /// Returns whether a text asks which of several named things is so.
+    pub(crate) fn asks_which(&self, text: &str) -> bool {
+        language::asks_which(text, self.identities)
+    }
+
     /// Returns whether words can be read as a thing. With `strict`, all of them must be known here.
     pub(crate) fn is_thing(&self, words: &[&str], strict: bool) -> bool {
         if self.whole(words).is_some() {

@@ -5,6 +5,7 @@ use std::io::{self, Write};
 use std::path::Path;
 
 use glam::DVec3;
+use serde::{Deserialize, Serialize};
 use strum::VariantArray;
 
 use super::atomic::{self, WriteProgress};
@@ -12,7 +13,7 @@ use super::{IoError, compressed_ply, khr_gltf, shift, sog, splat, splat_ply, spz
 use crate::scene::{GaussianCloud, SplatRenderMode};
 
 /// A format for Gaussians.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum, strum::VariantArray)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum, strum::VariantArray)]
 pub enum SplatFormat {
     /// Any splat viewer's, without loss
     Ply,

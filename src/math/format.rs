@@ -166,12 +166,17 @@ pub(crate) fn length(units: f64, meters_per_unit: Option<f64>) -> String {
     }
 }
 
+/// A number with four digits, or a whole one in groups of three.
+fn grouped(v: f64) -> String {
+    if (999.5..1e15).contains(&v) { count(v.round() as u64) } else { number(v) }
+}
+
 /// An area: in m\u{b2}, cm\u{b2} or mm\u{b2} where the length of a unit in meters is known, else in square units.
 pub(crate) fn area(square_units: f64, meters_per_unit: Option<f64>) -> String {
     let Some(scale) = meters_per_unit else { return format!("{} units\u{b2}", number(square_units)) };
     match square_units * scale * scale {
         m if m >= 1.0 => format!("{} m\u{b2}", number(m)),
-        m if m >= 1e-4 => format!("{} cm\u{b2}", number(m * 1e4)),
+        m if m >= 1e-4 => format!("{} cm\u{b2}", grouped(m * 1e4)),
         m => format!("{} mm\u{b2}", number(m * 1e6)),
     }
 }
@@ -181,7 +186,7 @@ pub(crate) fn volume(cubic_units: f64, meters_per_unit: Option<f64>) -> String {
     let Some(scale) = meters_per_unit else { return format!("{} units\u{b3}", number(cubic_units)) };
     match cubic_units * scale.powi(3) {
         m if m >= 0.1 => format!("{} m\u{b3}", number(m)),
-        m if m >= 1e-6 => format!("{} cm\u{b3}", number(m * 1e6)),
+        m if m >= 1e-6 => format!("{} cm\u{b3}", grouped(m * 1e6)),
         m => format!("{} mm\u{b3}", number(m * 1e9)),
     }
 }
@@ -305,7 +310,7 @@ mod tests {
         let scaled = [1.0, 0.02, 1e-4].map(|side: f64| area(side * side, Some(2.0)));
         assert_eq!(scaled, ["4.000 m\u{b2}", "16.00 cm\u{b2}", "0.04000 mm\u{b2}"]);
         let cubes = [1.0, 0.1, 1e-3].map(|side: f64| volume(side * side * side, Some(1.0)));
-        assert_eq!(cubes, ["1.000 m\u{b3}", "1000 cm\u{b3}", "1.000 mm\u{b3}"]);
+        assert_eq!(cubes, ["1.000 m\u{b3}", "1,000 cm\u{b3}", "1.000 mm\u{b3}"]);
         assert_eq!(volume(8.0, None), "8.000 units\u{b3}");
     }
 

@@ -18,7 +18,7 @@ use super::state::AppState;
 use super::text_field::cursor_to_end;
 use super::theme;
 use super::viewport::Viewport;
-use crate::agent::commands::{Commands, complete};
+use crate::agent::commands::{Commands, complete, part_not_understood};
 use crate::agent::llm::Llm;
 use crate::agent::scene::{AgentScene, Effect, SceneWorld};
 use crate::agent::{AgentEvent, Awaited, Planner, Policy, RefusalKind, Session, World};
@@ -340,7 +340,12 @@ impl Agent {
         self.reply(
             match offers.is_empty() {
                 true => ChatAnswer { candidates, refused: reply.refused, asks, ..ChatAnswer::new(&text) },
-                false => ChatAnswer { offers, ..ChatAnswer::new(NOT_BY_CHAT) },
+                false => {
+                    let part = part_not_understood(&said, identities);
+                    let part = part.map(|p| format!("Not understood: \u{201c}{p}\u{201d}. Nothing was done. "));
+                    let text = part.unwrap_or_default() + NOT_BY_CHAT;
+                    ChatAnswer { offers, ..ChatAnswer::new(&text) }
+                }
             },
             transcript,
         );

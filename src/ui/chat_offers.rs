@@ -156,7 +156,11 @@ const OFFERS: &[(&[&str], Offered)] = &[
 /// Actions for a sentence that the chat did not understand. `is_missing`: it was understood but names a thing that is
 /// not there; a single word is then no reason to offer something else.
 pub(super) fn offers(sentence: &str, all: &Identities, is_missing: bool) -> Vec<(Action, String)> {
-    let said = words(sentence);
+    let mut said = words(sentence);
+    // To turn a thing off is no turn.
+    if let Some(at) = switch(&said) {
+        said.remove(at);
+    }
     let fit = OFFERS.iter().find_map(|(phrases, offered)| {
         let mut clear = phrases.iter().filter(|phrase| !is_missing || phrase.contains(' '));
         Some((offered, clear.find_map(|phrase| fits(phrase, &said, all))?))
@@ -177,6 +181,21 @@ pub(super) fn offers(sentence: &str, all: &Identities, is_missing: bool) -> Vec<
             }
         },
     }
+}
+
+/// The word "turn" or "switch" of "turn the lamp off" and "turn on the lamp".
+fn switch(said: &[String]) -> Option<usize> {
+    let is_end = |word: Option<&String>| word.is_none_or(|w| matches!(w.as_str(), "and" | "then" | "please" | "again"));
+    let switches = |at: &usize| {
+        let rest = &said[at + 1..];
+        let ends = |k: usize| match rest[k].as_str() {
+            "off" => true,
+            "on" => k == 0 || is_end(rest.get(k + 1)),
+            _ => false,
+        };
+        (0..rest.len().min(GAP + ARTICLES)).any(ends)
+    };
+    (0..said.len()).filter(|at| matches!(said[*at].as_str(), "turn" | "switch")).find(switches)
 }
 
 /// Compares a phrase with a sentence: its words must occur in this order, not far from each other. Returns the thing
@@ -201,14 +220,22 @@ fn fits(phrase: &str, said: &[String], all: &Identities) -> Option<Option<Identi
 }
 
 /// The thing whose name begins at a word of a sentence, and the number of its words; `None` if it could be one of
-/// several.
+/// several. Where no whole name begins, the last words of one do: "the bear" for "teddy bear".
 fn named_at(said: &[String], at: usize, all: &Identities) -> Option<(IdentityId, usize)> {
     let named = |at: usize| {
-        let longest = move |id| all.words().names(id).iter().filter(|n| said[at..].starts_with(n)).map(Vec::len).max();
-        all.iter().filter_map(move |(id, _)| Some((id, longest(id).filter(|n| *n > 0)?)))
+        let begins = |name: &[String], is_whole: bool| {
+            let cut = if is_whole { 0..1 } else { 1..name.len() };
+            cut.map(|from| &name[from..]).find(|end| said[at..].starts_with(end)).map_or(0, <[String]>::len)
+        };
+        let of = |is_whole: bool| -> Vec<(IdentityId, usize)> {
+            let longest = |id| all.words().names(id).iter().map(|name| begins(name, is_whole)).max().unwrap_or(0);
+            all.iter().map(|(id, _)| (id, longest(id))).filter(|(_, n)| *n > 0).collect()
+        };
+        let whole = of(true);
+        if whole.is_empty() { of(false) } else { whole }
     };
-    let most = named(at).map(|(_, n)| n).max()?;
-    let ids: Vec<IdentityId> = named(at).filter(|(_, n)| *n == most).map(|(id, _)| id).collect();
+    let most = named(at).into_iter().map(|(_, n)| n).max()?;
+    let ids: Vec<IdentityId> = named(at).into_iter().filter(|(_, n)| *n == most).map(|(id, _)| id).collect();
     // "the lid of the kettle": the lid whose whole is named as well.
     let wholes: Vec<IdentityId> = (0..said.len()).flat_map(named).map(|(id, _)| id).collect();
     let mut within = ids.iter().filter(|id| wholes.iter().any(|whole| all.is_piece(**id, *whole)));
@@ -231,7 +258,7 @@ mod tests {
         all.add(Level::Part, jar, vec!["lid".into()]);
         all.add(Level::Object, NO_IDENTITY, vec!["red controller".into()]);
         all.add(Level::Object, NO_IDENTITY, vec!["blue controller".into()]);
-        all.add(Level::Object, NO_IDENTITY, vec!["teddy bear".into(), "bear".into()]);
+        all.add(Level::Object, NO_IDENTITY, vec!["teddy bear".into()]);
         all.add(Level::Object, NO_IDENTITY, vec!["camera".into()]);
         all
     }
@@ -255,6 +282,8 @@ mod tests {
             ("duplicate the lid of the kettle", Action::Transform(2)),
             ("make a video that goes around the bear", Action::Turntable(Some(7))),
             ("fly around the kettle", Action::Turntable(Some(1))),
+            ("turn the kettle on its side", Action::Transform(1)),
+            ("turn the lid of the jar to the left", Action::Transform(4)),
             ("make a video that goes around", Action::ShowPane(Pane::Camera)),
             ("record a short movie of all this", Action::ShowPane(Pane::Camera)),
             ("export the kettle as glb", Action::ExportTarget(1)),
@@ -292,6 +321,9 @@ mod tests {
             "this jar is in my way, take it off the picture for a second",
             "undo the change to the red controller",
             "tell me a joke",
+            "turn the camera off",
+            "turn off the kettle please",
+            "which is bigger, the camera or the teddy bear, and turn the kettle on",
             "",
         ] {
             assert_eq!(first(sentence), None, "{sentence}");

@@ -244,6 +244,7 @@ fn size_text(bytes: u64) -> String {
 fn short(what: &str) -> String {
     let names = what.strip_prefix("the properties ").map(|names| names.split(", ").collect::<Vec<_>>());
     match names.as_deref() {
+        Some(names) if names.iter().all(|name| name.starts_with("fmlgs_")) => "objects and parts".to_owned(),
         Some([first, rest @ ..]) if rest.len() > 1 => format!("{} properties ({first}, \u{2026})", rest.len() + 1),
         _ => what.to_owned(),
     }
@@ -276,6 +277,8 @@ mod tests {
             [999, 1_280, 123_456, 1_440_000, 1_360_000, 123_000_000].map(size_text),
             ["999 B", "1.3 kB", "123 kB", "1.4 MB", "1.4 MB", "123 MB"]
         );
+        assert_eq!(short("the properties fmlgs_identity, fmlgs_margin"), "objects and parts");
+        assert_eq!(short("the properties fmlgs_identity, b, c"), "3 properties (fmlgs_identity, \u{2026})");
         assert_eq!(short("the properties a, b, c"), "3 properties (a, \u{2026})");
         assert_eq!(["the properties a, b", "flag of surfels"].map(short), ["the properties a, b", "flag of surfels"]);
     }

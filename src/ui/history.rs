@@ -188,6 +188,7 @@ pub(crate) fn splat_edit_text(edit: &SplatEdit, all: &Identities) -> String {
             let what = match to {
                 _ if to.duplicate => "duplicated",
                 _ if to.to == Placement::default() => "recolored",
+                _ if to.is_recolored() => return format!("changed {}: moved, recolored", all.label(to.id)),
                 _ => "moved",
             };
             format!("{what} {}", all.label(to.id))
@@ -253,8 +254,9 @@ fn shown_text(before: &BTreeSet<IdentityId>, now: &BTreeSet<IdentityId>, all: &I
         ids.iter().copied().filter(|id| all.get(*id).is_some() && !whole(id)).collect()
     };
     let drawn: BTreeSet<IdentityId> = all.iter().map(|(id, _)| id).filter(|id| !now.contains(id)).collect();
-    if let (true, [only]) = (now.contains(&NO_IDENTITY), outermost(&drawn).as_slice()) {
-        return format!("showed only {}", all.full_name(*only));
+    if let (true, [_] | [_, _]) = (now.contains(&NO_IDENTITY), outermost(&drawn).as_slice()) {
+        let only: Vec<String> = outermost(&drawn).into_iter().map(|id| all.full_name(id)).collect();
+        return format!("showed only {}", only.join(" and "));
     }
     let named = |ids: BTreeSet<IdentityId>| match outermost(&ids).as_slice() {
         [one] => all.full_name(*one),
@@ -394,6 +396,7 @@ mod tests {
         assert_eq!(text(&[], &[2]), "hid shade · lamp");
         assert_eq!(text(&[1, 2, 3], &[3]), "showed lamp");
         assert_eq!(text(&[], &[0, 1, 3]), "showed only shade · lamp");
+        assert_eq!(text(&[0, 1, 2], &[0]), "showed only lamp and table");
         assert_eq!(text(&[2], &[3]), "hid table, showed shade · lamp");
     }
 }

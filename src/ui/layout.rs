@@ -9,6 +9,7 @@ use super::chat_model::ChatSettings;
 use super::dock::Dock;
 use super::file_kind::{FileKind, KindFolders};
 use super::video_choice::VideoChoice;
+use crate::io::splat_format::SplatFormat;
 use crate::jobs::find_objects::FindSettings;
 use crate::pipeline::train::TrainConfig;
 use crate::scene::Overrides;
@@ -94,6 +95,8 @@ pub struct Layout {
     pub(crate) chat: ChatSettings,
     /// Choices for videos.
     pub(crate) video: VideoChoice,
+    /// Format that Gaussians were last exported in.
+    pub(crate) export: SplatFormat,
     /// Recently opened files and folders.
     pub(crate) recent: Vec<PathBuf>,
     /// Folder that each kind of files was last chosen from.
@@ -124,6 +127,7 @@ impl Default for Layout {
             finding: FindSettings::default(),
             chat: ChatSettings::default(),
             video: VideoChoice::default(),
+            export: SplatFormat::Ply,
             recent: Vec::new(),
             folders: KindFolders::new(),
             folder: None,
@@ -205,7 +209,8 @@ mod tests {
 
     #[test]
     fn a_layout_comes_back_as_it_was_saved() {
-        let mut layout = Layout { split: 0.25, recent: vec!["a/b".into()], ..Layout::default() };
+        let recent = vec!["a/b".into()];
+        let mut layout = Layout { split: 0.25, recent, export: SplatFormat::Spz, ..Layout::default() };
         layout.toggle(Pane::Dataset);
         let mut storage = Memory::default();
         layout.save(&mut storage);

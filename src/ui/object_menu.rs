@@ -60,8 +60,8 @@ pub(crate) fn keyed(all: &Identities, id: IdentityId, action: &Action) -> Option
     })
 }
 
-/// Draws the menu under the thing's name.
-pub(crate) fn show(ui: &mut Ui, all: &Identities, id: IdentityId, cx: &mut Ctx<'_>) {
+/// Draws the menu under the thing's name. `is_hidden`: none of the thing is drawn.
+pub(crate) fn show(ui: &mut Ui, all: &Identities, id: IdentityId, is_hidden: bool, cx: &mut Ctx<'_>) {
     ui.label(RichText::new(text::elided(&cx.state.labels.full_name(all, id), 48)).strong());
     ui.separator();
     for row in rows(all, id) {
@@ -69,6 +69,11 @@ pub(crate) fn show(ui: &mut Ui, all: &Identities, id: IdentityId, cx: &mut Ctx<'
             Row::Line => drop(ui.separator()),
             Row::MergeInto => drop(ui.menu_button("Merge into", |ui| merge_into(ui, all, id, cx))),
             Row::Do(action, name, keyed) => {
+                let name = match action {
+                    Action::Hide(_) if is_hidden => "Show",
+                    Action::Hide(_) => "Hide",
+                    _ => name,
+                };
                 let button = match keyed {
                     Some(keyed) => Button::new(name).shortcut_text(keys::label(ui.ctx(), &keyed)),
                     None => Button::new(name),

@@ -7,7 +7,8 @@ use egui::{Align, Align2, Area, Button, Frame, Id, Label, Layout, Margin, Order,
 use super::state::{AppState, Toast, Tone};
 use super::theme;
 
-/// Display time of a message, s; longer for warnings and figures, which take time to read. Errors stay.
+/// Display time of a message, s; longer for results, warnings, figures and long texts, which take time to read. Errors
+/// stay.
 const STAY_SECS: f64 = 4.0;
 const STAY_LONG_SECS: f64 = 9.0;
 /// Width of the line where it floats over a view that fills the window, points.
@@ -20,6 +21,9 @@ pub(crate) enum ToastClick {
     OpenLog,
 }
 
+/// Characters from which on a message is long.
+const LONG: usize = 60;
+
 /// Time at which each message was first seen.
 #[derive(Default)]
 pub(crate) struct Toasts {
@@ -27,13 +31,23 @@ pub(crate) struct Toasts {
 }
 
 impl Toasts {
-    /// Drops messages whose time is over. An error stays until it is dismissed, or read in the log.
+    /// Drops messages whose time is over. An error stays until it is dismissed, or read in the log. The time of a result
+    /// begins once no other message covers it and the user is back: a long job may end while nobody looks.
     pub(crate) fn update(&mut self, ctx: &egui::Context, state: &mut AppState, log_is_open: bool) {
-        let now = ctx.input(|i| i.time);
+        let (now, is_there) = ctx.input(|i| (i.time, !i.events.is_empty()));
+        let newest = state.toasts.last().map(|t| t.id);
         let mut next = f64::INFINITY;
         state.toasts.retain(|toast| {
+            if toast.is_result && newest != Some(toast.id) {
+                self.since.remove(&toast.id);
+                return true;
+            }
+            if toast.is_result && !is_there && !self.since.contains_key(&toast.id) {
+                return true;
+            }
+            let is_short = toast.text.len() < LONG && !toast.text.contains(|c: char| c.is_ascii_digit());
             let left = match toast.tone {
-                Tone::Info | Tone::Good if !toast.text.contains(|c: char| c.is_ascii_digit()) => STAY_SECS,
+                Tone::Info | Tone::Good if is_short && !toast.is_result => STAY_SECS,
                 Tone::Info | Tone::Good => STAY_LONG_SECS,
                 Tone::Warning => STAY_LONG_SECS,
                 Tone::Error => return !log_is_open,
@@ -63,7 +77,7 @@ pub(crate) fn show(ui: &mut Ui, toasts: &[Toast]) -> Option<ToastClick> {
             let others = toasts.len() - 1;
             if others > 0 {
                 let link = ui.link(RichText::new(format!("{others} more in the log")).small());
-                if link.on_hover_text("Warnings that came before").clicked() {
+                if link.on_hover_text("Messages that came before").clicked() {
                     clicked = Some(ToastClick::OpenLog);
                 }
             }
@@ -130,6 +144,30 @@ mod tests {
         state.toast(Tone::Good, "Showed everything");
         assert_eq!(left(&mut toasts, &mut state, 11.0, false).len(), 1);
         assert!(left(&mut toasts, &mut state, 18.0, false).is_empty());
+    }
+
+    #[test]
+    fn results_are_not_replaced_and_wait_for_the_user() {
+        let (mut toasts, mut state) = (Toasts::default(), AppState::default());
+        let mut left = |state: &mut AppState, secs: f64, is_there: bool| -> Vec<String> {
+            let ctx = egui::Context::default();
+            let events = if is_there { vec![egui::Event::PointerMoved(egui::Pos2::ZERO)] } else { Vec::new() };
+            let input = egui::RawInput { time: Some(secs), events, ..egui::RawInput::default() };
+            ctx.run_ui(input, |ui| toasts.update(ui.ctx(), state, false)).textures_delta.clear();
+            state.toasts.iter().map(|t| t.text.clone()).collect()
+        };
+        state.result("Saved to mug.spz");
+        state.result("Saved to mug.mp4");
+        state.toast(Tone::Info, "Showed everything");
+        assert_eq!(left(&mut state, 1.0, true), ["Saved to mug.spz", "Saved to mug.mp4", "Showed everything"]);
+        // Control: what is no result goes after its time.
+        assert_eq!(left(&mut state, 6.0, true), ["Saved to mug.spz", "Saved to mug.mp4"]);
+        assert_eq!(left(&mut state, 100.0, false), ["Saved to mug.spz", "Saved to mug.mp4"], "nobody was there");
+        assert_eq!(left(&mut state, 101.0, true).len(), 2);
+        assert_eq!(left(&mut state, 105.0, false).len(), 2);
+        assert_eq!(left(&mut state, 111.0, false), ["Saved to mug.spz"]);
+        assert_eq!(left(&mut state, 112.0, true).len(), 1);
+        assert!(left(&mut state, 122.0, false).is_empty());
     }
 
     #[test]

@@ -4,6 +4,8 @@
 mod complete;
 mod example;
 mod form;
+mod halves;
+mod nearest;
 mod task;
 
 pub use super::language::{CommandHelp, commands};
@@ -13,6 +15,8 @@ use std::collections::VecDeque;
 
 use self::example::example;
 use self::form::{FormItem, FormRequest, Slots, Things, beginning_with, sequences};
+use self::halves::SEPARATORS;
+pub(crate) use self::nearest::nearest;
 use self::task::{CommandStep, task};
 use super::camera_args::{CLOSENESS, CLOSER, Direction, Distance, FARTHER, NORMAL};
 use super::dialog::DialogState;
@@ -33,8 +37,6 @@ use crate::scene::{Identities, LevelFilter};
 
 /// Maximum number of tasks per request.
 const MOST_TASKS: usize = 16;
-/// Words that separate one command from the next.
-const SEPARATORS: [&str; 4] = [",", "and", "then", "?"];
 
 /// Planner of the command language.
 #[derive(Default)]
@@ -52,9 +54,7 @@ impl Planner for Commands {
     fn start(&mut self, request: &str, context: &mut PlannerContext<'_>) {
         *self = Self::default();
         let identities = context.world.identities();
-        let search =
-            || language::is_search(request, identities).then(|| vec![CommandStep::Call(ToolCall::ask(request))]);
-        let Some(tasks) = parse(request, identities).or_else(search) else {
+        let Some(tasks) = parse(request, identities).or_else(|| search(request, identities)) else {
             self.refusal = Some(not_understood(request, context.world.identities()));
             return;
         };
@@ -136,6 +136,16 @@ pub(crate) fn parse(request: &str, identities: &Identities) -> Option<Vec<Comman
     readings.find_map(with).filter(|tasks| tasks.len() <= MOST_TASKS)
 }
 
+fn search(request: &str, identities: &Identities) -> Option<Vec<CommandStep>> {
+    language::is_search(request, identities).then(|| vec![CommandStep::Call(ToolCall::ask(request))])
+}
+
+/// Returns the part of a request that is not understood, if the rest of it is.
+pub(crate) fn part_not_understood<'a>(request: &'a str, identities: &Identities) -> Option<&'a str> {
+    let is_understood = |text: &str| parse(text, identities).or_else(|| search(text, identities)).is_some();
+    halves::not_understood(request, is_understood)
+}
+
 /// Returns whether a text is a command and not only a name.
 pub(crate) fn is_command(text: &str, identities: &Identities) -> bool {
     let words = words_of(text);
@@ -190,8 +200,22 @@ fn opens(words: &[&str], phrase: &str) -> Option<usize> {
 
 /// Parses one command, first as typed, then without polite words: a name may begin or end with one of them.
 fn command(request: &FormRequest<'_>, is_first: bool) -> Option<Vec<CommandStep>> {
+    if let Some(question) = choice(request) {
+        return Some(vec![CommandStep::Call(ToolCall::ask(&question))]);
+    }
     let all = if request.things == Things::Whole { one(request, is_first) } else { None };
     all.or_else(|| one(&trimmed(request), is_first))
+}
+
+/// Returns the text of a request that asks which of several things is so; the query's grammar answers it.
+fn choice(request: &FormRequest<'_>) -> Option<String> {
+    let has = |word: &str| request.words.contains(&word);
+    if !has("or") || !["which", "what", "who"].into_iter().any(has) {
+        return None;
+    }
+    let raw: Vec<&str> = request.tokens.iter().map(|t| t.raw.as_str()).collect();
+    let text = raw.join(" ").replace(" 's", "'s").replace(" ,", ",").replace(" ?", "?");
+    request.known.asks_which(&text).then_some(text)
 }
 
 /// Parses one command: the first sequence that matches. With complete names the longest name wins, as "the handle
@@ -309,39 +333,6 @@ fn all_of(phrase: &str, world: &mut dyn World, dialog: &DialogState) -> Result<O
     Ok(Some(ids))
 }
 
-/// Commands nearest to a request: the first word counts most, then other shared words.
-pub(crate) fn nearest(request: &str, identities: &Identities) -> Vec<String> {
-    let tokens = request_tokens(request);
-    let words: Vec<&str> = tokens.iter().map(|t| t.low.as_str()).filter(|w| *w != ",").collect();
-    let common = ["the", "a", "is", "to", "of", "in", "it", "me", "and"];
-    let score = |items: &[FormItem]| {
-        let own: Vec<&str> = items.iter().filter_map(FormItem::word).collect();
-        let verb = own.first().is_some_and(|w| words.first().is_some_and(|f| alike(f, w)));
-        let shared = words.iter().filter(|w| !common.contains(*w) && own.iter().any(|o| alike(o, w))).count();
-        3 * usize::from(verb) + 2 * shared
-    };
-    let mut best: Vec<(usize, &CommandHelp)> = Vec::new();
-    for sequence in sequences() {
-        let score = score(&sequence.items);
-        match best.last_mut() {
-            Some((most, command)) if std::ptr::eq(*command, sequence.command) => *most = score.max(*most),
-            _ => best.push((score, sequence.command)),
-        }
-    }
-    best.sort_by_key(|(score, _)| std::cmp::Reverse(*score));
-    let fits = best.iter().filter(|(score, _)| *score > 0).map(|(_, c)| *c);
-    let usual = ["show me the {}", "what is on the table", "describe the {}"];
-    let usual = commands().iter().filter(|c| usual.contains(&c.example.as_str()));
-    let mut found: Vec<String> = Vec::new();
-    for command in fits.chain(usual) {
-        let text = example(command, identities, &words);
-        if found.len() < 3 && !found.contains(&text) {
-            found.push(text);
-        }
-    }
-    found
-}
-
 /// Request with typing errors corrected, if that makes it a command. It is only suggested, never executed.
 fn corrected(request: &str, identities: &Identities) -> Option<String> {
     let known = NameWords::new(identities);
@@ -362,8 +353,9 @@ fn corrected(request: &str, identities: &Identities) -> Option<String> {
 }
 
 fn not_understood(request: &str, identities: &Identities) -> Refusal {
-    let said: String = request.trim().chars().take(80).collect();
-    let mut near = nearest(request, identities);
+    let part = part_not_understood(request, identities).unwrap_or(request);
+    let said: String = part.trim().chars().take(80).collect();
+    let mut near = nearest(part, identities);
     if let Some(text) = corrected(request, identities) {
         near.insert(0, text);
         near.truncate(3);

@@ -48,6 +48,11 @@ impl Arrangement {
     pub(crate) fn of(id: IdentityId) -> Self {
         Self { id, duplicate: false, to: Placement::default(), color: None, grade: Grade::default() }
     }
+
+    /// Returns whether its colors change.
+    pub(crate) fn is_recolored(&self) -> bool {
+        self.color.is_some() || self.grade != Grade::default()
+    }
 }
 
 /// Placement of an object: rotated and scaled about its own middle, then shifted.
@@ -113,9 +118,9 @@ pub(crate) fn apply(
 ) -> Result<(GaussianCloud, Option<SemanticMap>)> {
     match edit {
         SplatEdit::Delete(gone) => delete(cloud, map, gone),
-        SplatEdit::Arrange(Arrangement { id, duplicate, to, color, grade }) => {
+        SplatEdit::Arrange(change @ Arrangement { id, duplicate, to, color, grade }) => {
             let matrix = grade.matrix().ok_or(SplatEditError::Grade)?;
-            let is_recolored = color.is_some() || *grade != Grade::default();
+            let is_recolored = change.is_recolored();
             let (map, mut thing) = thing(map, *id)?;
             match (to.is_nothing(), duplicate, is_recolored) {
                 (true, false, false) => return Err(SplatEditError::NoChange),

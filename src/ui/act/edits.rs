@@ -8,9 +8,11 @@ use crate::jobs::JobError;
 use crate::jobs::edit::{self, EditRequest};
 use crate::jobs::rearrange::{RearrangeRequest, SplatChange, SplatEdit};
 use crate::jobs::select::empty_map;
+use crate::math::format;
 use crate::pipeline::observer::{Observer, Severity};
 use crate::pipeline::semantics::lifting::edit::Edit;
-use crate::scene::Identities;
+use crate::scene::identity::whole_names::BETWEEN;
+use crate::scene::{Identities, IdentityId, Level};
 use crate::ui::app::App;
 use crate::ui::context::SceneContext;
 use crate::ui::history::{EditSnapshot, EditStep, Editing, ViewState, edit_text, splat_edit_text};
@@ -158,8 +160,13 @@ fn record(app: &mut App, editing: Editing) {
         return;
     };
     let before = app.state.changes.now().and_then(|now| now.map.clone());
-    let mut emptied = Vec::new();
+    let (mut emptied, mut by) = (Vec::new(), "It");
     if let (Some(old), Some(new)) = (before, map) {
+        if old.identities.len() < new.identities.len() {
+            let is_part =
+                new.identities.get(new.identities.len() as IdentityId).is_some_and(|i| i.level == Level::Part);
+            by = if is_part { "The new part" } else { "The new object" };
+        }
         if old.identities.len() > new.identities.len() {
             app.viewport.visibility.renumber(&old.identities, &new.identities);
         } else {
@@ -168,12 +175,24 @@ fn record(app: &mut App, editing: Editing) {
     }
     // A refused or failed edit was reported and leaves nothing to undo.
     if let Some(what) = app.state.changes.settle(&snapshot(app), Some(&what)) {
-        app.state.toast(Tone::Good, sentence(&what));
-        if let [first, others @ ..] = emptied.as_slice() {
-            let are = if others.is_empty() { "is".to_owned() } else { format!("and {} more are", others.len()) };
-            let text = format!("{first} {are} empty now: no Gaussians are left there. Undo brings them back.");
+        let copy = app.state.copied.take().map(|name| format!(". Changes go to a copy, \u{201c}{name}\u{201d}."));
+        app.state.toast(Tone::Good, sentence(&what) + &copy.unwrap_or_default());
+        if !emptied.is_empty() {
+            let text = format!("{by} took all Gaussians of {}. Undo brings them back.", together(&emptied));
             app.state.toast(Tone::Warning, text);
         }
+    }
+}
+
+/// Joins full names; parts of one whole name it once: "lid and rim of the cookie jar".
+fn together(names: &[String]) -> String {
+    let parts: Vec<(&str, &str)> = names.iter().filter_map(|name| name.split_once(BETWEEN)).collect();
+    match parts.as_slice() {
+        [(_, whole), ..] if parts.len() == names.len() && parts.iter().all(|(_, of)| of == whole) => {
+            let parts: Vec<String> = parts.iter().map(|(part, _)| (*part).to_owned()).collect();
+            format!("{} of the {whole}", format::list(&parts))
+        }
+        _ => format::list(names),
     }
 }
 
@@ -260,5 +279,22 @@ pub(in crate::ui) fn settle(app: &mut App, at_rest: bool) {
     match shown {
         true => app.state.toast(Tone::Info, sentence(&what)),
         false => app.state.say(Tone::Info, sentence(&what)),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn parts_of_one_whole_name_it_once() {
+        let names = |all: &[&str]| together(&all.iter().map(|name| (*name).to_owned()).collect::<Vec<_>>());
+        let of = |part: &str, whole: &str| format!("{part}{BETWEEN}{whole}");
+        let (lid, rim) = (of("lid", "jar"), of("rim", "jar"));
+        assert_eq!(names(&[&lid, &rim]), "lid and rim of the jar");
+        // Controls: another whole, and a whole itself.
+        let spout = of("spout", "kettle");
+        assert_eq!(names(&[&lid, &spout]), format!("{lid} and {spout}"));
+        assert_eq!(names(&["mug", &rim]), format!("mug and {rim}"));
     }
 }

@@ -37,7 +37,7 @@ pub(super) fn has_view(app: &mut App) -> bool {
 }
 
 pub(super) fn is_saved(app: &mut App, path: PathBuf) {
-    app.state.toast(Tone::Good, format!("Saved to {}", path.display()));
+    app.state.result(format!("Saved to {}", path.display()));
 }
 
 /// Writes every object and part into a folder, and their masks in the photos, if there are any.

@@ -85,7 +85,7 @@ fn show_anew(app: &mut App, offered: Vec<OfferedScope>, scope: ExportScope, clou
     let before = app.export_dialog.take();
     before.iter().for_each(|dialog| dialog.end(&app.tasks));
     let mut dialog = ExportDialog::new(offered, scope, cloud, &app.tasks);
-    dialog.format = before.map_or(dialog.format, |before| before.format);
+    dialog.format = before.map_or(app.layout.export, |before| before.format);
     app.export_dialog = Some(dialog);
 }
 
@@ -119,6 +119,7 @@ pub(in crate::ui) fn show_dialog(app: &mut App, ctx: &egui::Context) {
     let Some(dialog) = app.export_dialog.take() else { return };
     dialog.end(&app.tasks);
     if decision == ExportDecision::Save {
+        app.layout.export = dialog.format;
         save(app, &dialog);
     }
 }
@@ -130,6 +131,8 @@ fn save(app: &mut App, dialog: &ExportDialog) {
     let request = FileRequest::save(FileKind::Gaussians, "Export Gaussians", dialog.stem(), formats);
     let cloud = Arc::clone(&dialog.cloud);
     app.choose(request.with_format(format), |app, path| {
+        // The name may have the ending of another format.
+        app.layout.export = SplatFormat::of(&path).unwrap_or(app.layout.export);
         let info = JobInfo::short(format!("Writing {}", file_name(&path))).phases(phases::EXPORT);
         let write = move |observer: &mut dyn Observer| {
             let views = LossViews::of_cloud(&cloud);
@@ -139,7 +142,7 @@ fn save(app: &mut App, dialog: &ExportDialog) {
         };
         app.start(info, write, |app, (path, drawn)| {
             let loss = drawn.map_or_else(String::new, |drawn| format!(" ({})", drawn.line()));
-            app.state.toast(Tone::Good, format!("Saved to {}{loss}", path.display()));
+            app.state.result(format!("Saved to {}{loss}", path.display()));
         });
     });
 }

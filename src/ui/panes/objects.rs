@@ -241,7 +241,8 @@ impl Tree<'_> {
     /// Draws the menu of actions on an identity.
     fn menu(&mut self, ui: &mut Ui, id: IdentityId, cx: &mut Ctx<'_>) {
         let all = self.identities;
-        let menu = ui.menu_button("\u{2026}", |ui| object_menu::show(ui, all, id, cx));
+        let is_hidden = self.visibility.draws(all, id) == Some(false);
+        let menu = ui.menu_button("\u{2026}", |ui| object_menu::show(ui, all, id, is_hidden, cx));
         // The button stays while its menu is open, wherever the pointer is.
         match menu.inner {
             Some(()) => *self.menu_of = Some(id),

@@ -36,6 +36,8 @@ pub(crate) struct Toast {
     /// Kind of the message.
     pub(crate) tone: Tone,
     pub(crate) text: String,
+    /// True for the result of a job: it stays until the user has had time to read it.
+    pub(crate) is_result: bool,
 }
 
 /// An error that is shown until the user closes it.
@@ -82,12 +84,21 @@ impl AppState {
         }
     }
 
-    /// Shows a message that disappears by itself, and logs it. It replaces earlier ones but warnings and errors.
+    /// Shows a message that disappears by itself, and logs it. It replaces earlier ones but results, warnings and errors.
     pub(crate) fn toast(&mut self, tone: Tone, text: impl Into<String>) {
+        self.show(tone, text, false);
+    }
+
+    /// Shows the result of a job, which no other message replaces.
+    pub(crate) fn result(&mut self, text: impl Into<String>) {
+        self.show(Tone::Good, text, true);
+    }
+
+    fn show(&mut self, tone: Tone, text: impl Into<String>, is_result: bool) {
         let text = text::lines(&text.into()).into_owned();
         self.say(tone, text.clone());
-        self.toasts.retain(|t| matches!(t.tone, Tone::Warning | Tone::Error) && t.text != text);
-        self.toasts.push(Toast { id: self.next_toast, tone, text });
+        self.toasts.retain(|t| (t.is_result || matches!(t.tone, Tone::Warning | Tone::Error)) && t.text != text);
+        self.toasts.push(Toast { id: self.next_toast, tone, text, is_result });
         self.next_toast += 1;
     }
 

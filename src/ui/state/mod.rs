@@ -103,6 +103,8 @@ pub struct AppState {
     pub second_report: Option<ShownReport>,
     /// Status of the connection to the server of the current scene, if it has one.
     pub(crate) link: Option<LinkStatus>,
+    /// Name of the copy that the first edit has just made, until it is told.
+    pub(crate) copied: Option<String>,
     short_jobs: BTreeMap<JobId, RunningJob>,
     next_toast: u64,
 }
@@ -269,7 +271,8 @@ impl AppState {
         let before = self.scene.take()?;
         if !before.is_edited {
             let text = format!("Edits go into {}; {} stays as it is.", folder.display(), before.name);
-            self.toast(Tone::Info, text);
+            self.say(Tone::Info, text);
+            self.copied = Some(name.clone());
             self.remember(folder.clone());
         }
         self.scene = Some(Arc::new(OpenedScene {

@@ -35,10 +35,12 @@ pub(super) fn show(
     ui.vertical(|ui| {
         if let Some((near, far)) = depth {
             // The camera of an orthographic view is far away, and its distance means nothing.
-            let (text, from) =
-                if is_orthographic { ("Depth from the nearest point, units", near) } else { ("Depth, units", 0.0) };
-            ui.label(RichText::new(text).small());
-            bar(ui, Colormap::Turbo, [near, far].map(|d| format!("{:.2}", d - from)));
+            let (text, from) = if is_orthographic { ("Depth from the nearest point", near) } else { ("Depth", 0.0) };
+            let meters = cx.state.scene.as_ref().and_then(|scene| scene.meters_per_unit());
+            let unit = if meters.is_some() { "m" } else { "units" };
+            ui.label(RichText::new(format!("{text}, {unit}")).small());
+            let scale = meters.unwrap_or(1.0) as f32;
+            bar(ui, Colormap::Turbo, [near, far].map(|d| format!("{:.2}", (d - from) * scale)));
         }
         let meaning = match settings.color_by {
             ColorBy::Masks => return,

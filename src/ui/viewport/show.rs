@@ -77,7 +77,7 @@ impl Viewport {
         if let Some(semantics) = state.semantics.as_ref().filter(|_| picks) {
             let under = views.area_under_pointer(ui, shown, has_other);
             let maps = self.queries.maps().map(|m| &***m).filter(|_| !on_camera && !under.is_other);
-            self.picking.update(&response, under.shown, semantics, maps, cx);
+            self.picking.update(&response, under.shown, semantics, maps, &self.visibility, cx);
         }
         let works_in = self.show_over_frames(ui, &areas, is_second, picks, route, cx);
         self.queries.work_in(works_in);

@@ -220,7 +220,7 @@ fn what_is_left_without_gaussians_says_so_and_undo_brings_it_back() {
     assert!(w.shows("certain") && w.shows("Go there"), "the control");
     w.ask(Action::Change(Edit::AddPiece { of: 0, name: "mouth".into(), gaussians: all }));
     w.until("the new object", |a| map(a).identities.len() == 4);
-    assert_eq!(said(w.app(), "box 0 is empty now"), 1);
+    assert_eq!(said(w.app(), "The new object took all Gaussians of box 0"), 1);
     w.until("maps", |a| a.viewport.queries.maps().is_some());
     w.harness.run_steps(3);
     assert!(w.shows("It is empty: no Gaussians belong to it") && !w.shows("not in this view"));

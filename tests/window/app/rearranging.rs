@@ -72,6 +72,8 @@ fn what_no_photo_shows_is_measured_seen_deleted_and_brought_back() {
     w.until("it is stored", |a| a.state.scene.as_ref().is_some_and(|s| s.out == edited));
     w.until("less is shown", |a| a.viewport.cloud().is_some_and(|c| c.len() < before.len()));
     assert_eq!(stored(&edited), cloud(w.app()).len());
+    let said = |text: &str| w.app().state.log.iter().filter(|line| line.text.contains(text)).count();
+    assert_eq!(said("Changes go to a copy, "), 1, "the message of the edit says it");
     assert!(w.shows("Suspects"), "what is left need not be measured again");
     assert_eq!(std::fs::read(scene.join("point_cloud.ply")).expect("the scene"), opened);
     w.ask(Action::Undo);

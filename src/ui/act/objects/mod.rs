@@ -200,7 +200,7 @@ fn start_search(app: &mut App, scope: SearchScope, step: Option<FoundStep>) {
     app.start_in_scene(info, find, move |app, found| {
         let Some(map) = found else { return };
         if is_new {
-            app.state.toast(Tone::Good, format!("{} found", map.identities.counted()));
+            app.state.result(format!("{} found", map.identities.counted()));
         }
         app.state.set_semantics(Some(map));
         if let Some(step) = step {
@@ -258,11 +258,13 @@ pub(in crate::ui) fn submit_removal(app: &mut App, request: RemoveRequest) {
         return;
     }
     let all = if request.retrain { phases::RETRAINING } else { phases::REMOVAL };
-    let info = JobInfo::long("Removing").pausable().phases(all);
+    let (ids, map) = (request.options.ids.iter(), app.state.semantics.as_deref());
+    let names: Vec<String> = ids.filter_map(|id| Some(map?.identities.full_name(*id))).collect();
+    let info = JobInfo::long(format!("Removing {}", names.join(", "))).pausable().phases(all);
     let remove = move |observer: &mut dyn Observer| removal::run_request(&request, observer);
     app.start_in_scene(info, remove, |app, removed| {
         let Some(removed) = removed else { return };
-        app.state.toast(Tone::Good, removal::summary(&removed.name, &removed.report));
+        app.state.result(removal::summary(&removed.name, &removed.report));
         app.state.say(Tone::Info, format!("Saved to {}", removed.folder.display()));
         super::open::compare_scene(app, Some(removed.folder.clone()));
         // Both views show the place of what was removed.

@@ -6,11 +6,13 @@ use crate::scene::{Identities, IdentityId, NO_IDENTITY};
 use crate::ui::actions::Action;
 use crate::ui::ctx::Ctx;
 use crate::ui::object_menu;
+use crate::ui::viewport::visible::Visibility;
 
 /// Draws the menu of an identity, or of the view without one.
-pub(super) fn show(ui: &mut Ui, all: &Identities, id: Option<IdentityId>, cx: &mut Ctx<'_>) {
+pub(super) fn show(ui: &mut Ui, all: &Identities, id: Option<IdentityId>, visibility: &Visibility, cx: &mut Ctx<'_>) {
     if let Some(id) = id.filter(|id| all.get(*id).is_some()) {
-        return object_menu::show(ui, all, id, cx);
+        let is_hidden = visibility.draws(all, id) == Some(false);
+        return object_menu::show(ui, all, id, is_hidden, cx);
     }
     for (action, name) in [
         (Action::SegmentNew(Some(NO_IDENTITY)), "New object\u{2026}"),

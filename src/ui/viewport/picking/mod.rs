@@ -8,6 +8,7 @@ mod menu;
 use egui::{Color32, ColorImage, FontId, Pos2, Rect, Response, TextureHandle, TextureOptions, Ui, pos2, vec2};
 
 use super::outline;
+use super::visible::Visibility;
 use crate::jobs::query::ViewMaps;
 use crate::pipeline::semantics::view_map::ViewMap;
 use crate::scene::{Identities, IdentityId, Mask, PixelBox, SemanticMap, text};
@@ -72,6 +73,7 @@ impl Picking {
         shown: Rect,
         semantics: &SemanticMap,
         maps: Option<&ViewMaps>,
+        visibility: &Visibility,
         cx: &mut Ctx<'_>,
     ) {
         let all = &semantics.identities;
@@ -98,7 +100,7 @@ impl Picking {
                 response.ctx.request_repaint();
             }
         }
-        response.context_menu(|ui| menu::show(ui, all, self.menu, cx));
+        response.context_menu(|ui| menu::show(ui, all, self.menu, visibility, cx));
     }
 
     /// Draws outlines over the frame in `shown`, and the name beside the cursor.

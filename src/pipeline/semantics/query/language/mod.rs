@@ -178,6 +178,15 @@ pub(crate) fn is_search(text: &str, identities: &Identities) -> bool {
     sentences.next().is_some_and(|s| s.asks != Asks::Things || opens && is_known(s, identities))
 }
 
+/// Returns whether a text asks which of several named things is so: "which is bigger, the mug or the lamp".
+pub(crate) fn asks_which(text: &str, identities: &Identities) -> bool {
+    let is_choice = |sentence: Sentence| match sentence.set.set {
+        SetOf::Ranked { of, .. } | SetOf::Where { of, .. } => matches!(of.set, SetOf::Union { either: true, .. }),
+        _ => false,
+    };
+    read(text, identities).into_iter().next().is_some_and(|s| s.asks == Asks::Names && is_choice(s))
+}
+
 /// Returns whether a phrase means all there is.
 pub(crate) fn means_everything(text: &str, identities: &Identities) -> bool {
     let is_any = |e: &Expression| match &e.set {

@@ -164,9 +164,7 @@ fn status(tool: &SelectTool, ui: &mut Ui, scene: &ToolScene<'_>, cx: &Ctx<'_>) {
             ui.add(bar.desired_height(6.0)).on_hover_text(text);
             "Preparing\u{2026}".to_owned()
         }
-        Some(s) if s.id != NO_IDENTITY => {
-            format!("{}, {:.0} ms", format::things(s.gaussians.len(), "Gaussian"), s.ms)
-        }
+        Some(s) if s.id != NO_IDENTITY => format::things(s.gaussians.len(), "Gaussian"),
         Some(_) => "Nothing is selected".to_owned(),
         None => String::new(),
     };
