@@ -306,9 +306,14 @@ pub(crate) fn mark(ui: &mut Ui, tone: Tone, size: f32) {
     }
 }
 
+/// Draws a menu of the view in the window's own theme.
+pub(crate) fn in_window_theme<T>(ctx: &egui::Context, add: impl FnOnce() -> T) -> T {
+    within(ctx, THEME.get(), add)
+}
+
 /// Draws a card over the view, and its menus, in the window's own theme.
 pub(crate) fn card<T>(ctx: &egui::Context, area: Area, add: impl FnOnce(&mut Ui) -> T) -> InnerResponse<T> {
-    within(ctx, THEME.get(), || area.show(ctx, |ui| overlay().show(ui, add).inner))
+    in_window_theme(ctx, || area.show(ctx, |ui| overlay().show(ui, add).inner))
 }
 
 /// UV rectangle of the centered part of an image that fills a place.
