@@ -35,7 +35,7 @@ const MAX_LINES: usize = 400;
 /// Completions shown at once.
 const CONTINUATIONS: usize = 4;
 /// Least height of the box, its completions and the buttons below the conversation, points.
-const BELOW_PT: f32 = 90.0;
+const BELOW_PT: f32 = 62.0;
 
 /// Answer to what the program does, but not the chat.
 const NOT_BY_CHAT: &str = "The chat does not do this, but the program does (Ctrl+P finds it, too):";
@@ -269,13 +269,13 @@ impl PaneContents for Chat {
         self.show_continuations(ui, identities.filter(|_| !cx.layout.chat.use_model));
         ui.horizontal_wrapped(|ui| {
             self.chooser.show(ui, &mut cx.layout.chat);
-            if ui.add_enabled(self.transcript.is_some(), Button::new("Save conversation\u{2026}").small()).clicked() {
+            let save = ui.add_enabled(self.transcript.is_some(), Button::new("Save\u{2026}").small());
+            if save.on_hover_text(Action::SaveChat.text()).accessible_name(Action::SaveChat.text()).clicked() {
                 cx.ask(Action::SaveChat);
             }
-            if ui
-                .add_enabled(self.cancel.is_none() && !self.lines.is_empty(), Button::new("New conversation").small())
-                .clicked()
-            {
+            let has_lines = self.cancel.is_none() && !self.lines.is_empty();
+            let new = ui.add_enabled(has_lines, Button::new("New").small());
+            if new.on_hover_text("New conversation").accessible_name("New conversation").clicked() {
                 *self = Self::default();
             }
         });

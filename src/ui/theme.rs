@@ -355,6 +355,22 @@ mod tests {
     }
 
     #[test]
+    fn a_menu_of_the_dark_view_has_the_theme_of_the_window() {
+        let (ctx, mut seen) = (egui::Context::default(), Vec::new());
+        ctx.set_theme(Theme::Light);
+        ctx.run_ui(egui::RawInput::default(), |ui| {
+            begin_frame(ui.ctx());
+            dark(ui, |ui| {
+                let theme = || ui.ctx().theme();
+                seen.extend([theme(), in_window_theme(ui.ctx(), theme), theme()]);
+            });
+        })
+        .textures_delta
+        .clear();
+        assert_eq!(seen[..3], [Theme::Dark, Theme::Light, Theme::Dark]);
+    }
+
+    #[test]
     fn text_can_be_read_in_both_themes() {
         for c in [&DARK, &LIGHT] {
             for ground in [c.panel, c.canvas] {
