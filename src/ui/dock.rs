@@ -154,8 +154,9 @@ impl Dock {
         let view = tree.tiles.find_pane(&Place::View);
         let mut shown = Shown { contents, view, detach: None, hidden, front: &front };
         tree.ui(&mut shown, ui);
+        let detach = shown.detach;
         self.front = front;
-        if let Some(pane) = shown.detach {
+        if let Some(pane) = detach {
             self.detach(pane, true);
         }
         // Counted here: a pane alone in its place has no tab.
