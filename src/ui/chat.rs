@@ -35,7 +35,7 @@ const MAX_LINES: usize = 400;
 /// Completions shown at once.
 const CONTINUATIONS: usize = 4;
 /// Least height of the box, its completions and the buttons below the conversation, points.
-const BELOW_PT: f32 = 90.0;
+const BELOW_PT: f32 = 62.0;
 
 /// Answer to what the program does, but not the chat.
 const NOT_BY_CHAT: &str = "The chat does not do this, but the program does (Ctrl+P finds it, too):";
@@ -198,21 +198,25 @@ impl PaneContents for Chat {
         self.follow_scene(cx.state);
         let identities = cx.state.semantics.as_ref().map(|map| &map.identities);
         let (ready, mut say) = (identities.is_some(), None);
-        if self.lines.is_empty() {
-            ui.label(
-                RichText::new("Type a command to find, visit, measure or hide things. \u{201c}help\u{201d} lists all.")
+        // The box stands at the bottom of the pane from the start: it does not move under the pointer.
+        let height = (ui.available_height() - self.below_pt.max(BELOW_PT)).max(60.0);
+        let talk = ScrollArea::vertical().id_salt("talk").max_height(height).min_scrolled_height(height);
+        talk.auto_shrink(false).stick_to_bottom(true).show(ui, |ui| {
+            if self.lines.is_empty() {
+                ui.label(
+                    RichText::new(
+                        "Type a command to find, visit, measure or hide things. \u{201c}help\u{201d} lists all.",
+                    )
                     .color(theme::weak()),
-            );
-            ui.horizontal_wrapped(|ui| {
-                for example in ["What is in view?", "help"] {
-                    if ui.add_enabled(ready, Button::new(example).small()).clicked() {
-                        say = Some(example.to_owned());
+                );
+                ui.horizontal_wrapped(|ui| {
+                    for example in ["What is in view?", "help"] {
+                        if ui.add_enabled(ready, Button::new(example).small()).clicked() {
+                            say = Some(example.to_owned());
+                        }
                     }
-                }
-            });
-        } else {
-            let height = (ui.available_height() - self.below_pt.max(BELOW_PT)).max(60.0);
-            ScrollArea::vertical().id_salt("talk").max_height(height).stick_to_bottom(true).show(ui, |ui| {
+                });
+            } else {
                 match chat_lines::show(ui, &self.lines, object_thumbnails) {
                     Some(ChatClick::Say(text)) => say = Some(text),
                     Some(ChatClick::Do(action)) => cx.ask(action),
@@ -227,8 +231,8 @@ impl PaneContents for Chat {
                 for text in &self.waiting {
                     ui.weak(format!("next: {text}"));
                 }
-            });
-        }
+            }
+        });
         let below = ui.cursor().top();
         ui.horizontal(|ui| {
             let width = (ui.available_width() - 62.0).max(80.0);
@@ -265,13 +269,13 @@ impl PaneContents for Chat {
         self.show_continuations(ui, identities.filter(|_| !cx.layout.chat.use_model));
         ui.horizontal_wrapped(|ui| {
             self.chooser.show(ui, &mut cx.layout.chat);
-            if ui.add_enabled(self.transcript.is_some(), Button::new("Save conversation\u{2026}").small()).clicked() {
+            let save = ui.add_enabled(self.transcript.is_some(), Button::new("Save\u{2026}").small());
+            if save.on_hover_text(Action::SaveChat.text()).accessible_name(Action::SaveChat.text()).clicked() {
                 cx.ask(Action::SaveChat);
             }
-            if ui
-                .add_enabled(self.cancel.is_none() && !self.lines.is_empty(), Button::new("New conversation").small())
-                .clicked()
-            {
+            let has_lines = self.cancel.is_none() && !self.lines.is_empty();
+            let new = ui.add_enabled(has_lines, Button::new("New").small());
+            if new.on_hover_text("New conversation").accessible_name("New conversation").clicked() {
                 *self = Self::default();
             }
         });

@@ -1,7 +1,7 @@
 //! Display of the conversation: the user's sentences, the agent's steps, folded once they are answered, and the answers
 //! with their candidates.
 
-use egui::{Button, CollapsingHeader, Label, RichText, Ui};
+use egui::{Button, CollapsingHeader, Id, Label, RichText, TextStyle, Ui};
 
 use super::keys;
 use super::panes::object_thumbnails::ObjectThumbnails;
@@ -16,6 +16,11 @@ use crate::ui::actions::Action;
 const THUMBNAIL_PX: f32 = 34.0;
 /// Candidates that are shown.
 const CANDIDATES: usize = 8;
+
+/// Candidates that are always shown.
+const FEW_CANDIDATES: usize = 2;
+/// Width of the button that shows the others, points.
+const MORE_PT: f32 = 70.0;
 
 /// A line of the conversation.
 pub(super) enum Line {
@@ -103,6 +108,19 @@ pub(super) fn show(ui: &mut Ui, lines: &[Line], object_thumbnails: &ObjectThumbn
     clicked
 }
 
+/// Number of candidates that fit in one row beside a button for the others; at least one.
+fn fitting(ui: &Ui, candidates: &[(IdentityId, String)], with_thumbnails: bool) -> usize {
+    let (font, spacing) = (TextStyle::Button.resolve(ui.style()), ui.spacing());
+    let thumbnail = if with_thumbnails { THUMBNAIL_PX + spacing.item_spacing.x } else { 0.0 };
+    let beside = thumbnail + 2.0 * spacing.button_padding.x + spacing.item_spacing.x;
+    let mut room = ui.available_width() - MORE_PT;
+    let fits = candidates.iter().take_while(|(_, name)| {
+        room -= ui.painter().layout_no_wrap(name.clone(), font.clone(), theme::text()).size().x + beside;
+        room >= 0.0
+    });
+    fits.count().max(1)
+}
+
 /// Ways in which a line can be answered by a click.
 #[derive(Clone, Copy)]
 struct CanAnswer {
@@ -152,14 +170,22 @@ fn show_line(ui: &mut Ui, line: &Line, object_thumbnails: &ObjectThumbnails, can
                 });
             }
             if !candidates.is_empty() {
+                // One row: many chips would push the answer out of sight.
+                let all = Id::unique("all candidates").with((text, candidates));
+                let shows_all = ui.data(|d| d.get_temp::<bool>(all)).unwrap_or(candidates.len() <= FEW_CANDIDATES);
                 ui.horizontal_wrapped(|ui| {
-                    for (id, name) in candidates.iter().take(CANDIDATES) {
+                    let n = if shows_all { CANDIDATES } else { fitting(ui, candidates, can.choose) };
+                    for (id, name) in candidates.iter().take(n) {
                         if can.choose {
                             object_thumbnails.show(ui, *id, THUMBNAIL_PX);
                         }
                         if ui.add_enabled(can.choose, Button::new(name).small()).clicked() {
                             clicked = Some(ChatClick::Say(name.clone()));
                         }
+                    }
+                    let more = candidates.len().min(CANDIDATES).saturating_sub(n);
+                    if more > 0 && ui.button(RichText::new(format!("{more} more")).small()).clicked() {
+                        ui.data_mut(|d| d.insert_temp(all, true));
                     }
                 });
             }

@@ -1,6 +1,7 @@
 //! Arrangement of the panes around the view: tabs that can be dragged, hidden, or detached into windows.
 
-use egui::{Response, Ui, Vec2, ViewportBuilder, ViewportId, WidgetText};
+use egui::text::{LayoutJob, TextWrapping};
+use egui::{Response, TextStyle, Ui, Vec2, ViewportBuilder, ViewportId, WidgetText, vec2};
 use egui_tiles::{
     Behavior, Container, LinearDir, SimplificationOptions, TabState, Tabs, Tile, TileId, Tiles, Tree, UiResponse,
 };
@@ -80,7 +81,7 @@ fn wide() -> Tree<Place> {
     let work = tabs(&mut tiles, &[Pane::Training, Pane::Objects, Pane::Clean, Pane::Models, Pane::Plan]);
     let talk = tabs(&mut tiles, &[Pane::Chat, Pane::Query]);
     let right = tiles.insert_vertical_tile(vec![work, talk]);
-    share(&mut tiles, right, work, 1.9);
+    share(&mut tiles, right, work, 1.6);
     let root = tiles.insert_horizontal_tile(vec![photos, middle, right]);
     share(&mut tiles, root, photos, 250.0);
     share(&mut tiles, root, right, 350.0);
@@ -150,10 +151,12 @@ impl Dock {
         self.hidden.extend(front.iter().filter(|id| !self.front.contains(id)).map(|id| (*id, REVEALS)));
         self.hidden.retain(|(id, left)| *left > 0 && front.contains(id));
         let hidden = &self.hidden;
-        let mut shown = Shown { contents, view: tree.tiles.find_pane(&Place::View), detach: None, hidden };
+        let view = tree.tiles.find_pane(&Place::View);
+        let mut shown = Shown { contents, view, detach: None, hidden, front: &front };
         tree.ui(&mut shown, ui);
+        let detach = shown.detach;
         self.front = front;
-        if let Some(pane) = shown.detach {
+        if let Some(pane) = detach {
             self.detach(pane, true);
         }
         // Counted here: a pane alone in its place has no tab.
@@ -213,9 +216,29 @@ struct Shown<'a> {
     view: Option<TileId>,
     detach: Option<Pane>,
     hidden: &'a [(TileId, u8)],
+    front: &'a [TileId],
 }
 
 impl Shown<'_> {
+    /// Draws the name of a tab that is cut by the border of its bar again, with an ellipsis.
+    fn elide(&self, id: TileId, pane: Pane, button: &Response) {
+        let (seen, visuals) = (button.interact_rect, button.ctx.global_style().visuals.clone());
+        let margin = self.tab_title_spacing(&visuals);
+        if seen.width() < margin {
+            return;
+        }
+        let is_front = self.front.contains(&id);
+        let color = if is_front { visuals.strong_text_color() } else { visuals.weak_text_color() };
+        let ground = if is_front { visuals.panel_fill } else { self.tab_bar_color(&visuals) };
+        let font = TextStyle::Button.resolve(&button.ctx.global_style());
+        let mut name = LayoutJob::simple_singleline(pane.text().to_owned(), font, color);
+        name.wrap = TextWrapping::truncate_at_width((seen.width() - margin).max(1.0));
+        let painter = button.ctx.layer_painter(button.layer_id).with_clip_rect(seen);
+        painter.rect_filled(seen, 0.0, ground);
+        let galley = painter.layout_job(name);
+        painter.galley(seen.left_center() + vec2(margin, -0.5 * galley.size().y), galley, color);
+    }
+
     fn menu(&mut self, ui: &mut Ui, pane: Pane) {
         if ui.button("Open in its own window").clicked() {
             self.detach = Some(pane);
@@ -250,6 +273,9 @@ impl Behavior<Place> for Shown<'_> {
         let is_cut = button.interact_rect.width() < button.rect.width() - 1.0;
         if is_cut && self.hidden.iter().any(|(of, _)| *of == id) {
             button.scroll_to_me_animation(None, egui::style::ScrollAnimation::none());
+        }
+        if is_cut {
+            self.elide(id, pane, &button);
         }
         button.context_menu(|ui| self.menu(ui, pane));
         button.on_hover_text(format!("{}: drag to move, right-click for more", pane.text()))

@@ -306,9 +306,14 @@ pub(crate) fn mark(ui: &mut Ui, tone: Tone, size: f32) {
     }
 }
 
+/// Draws a menu of the view in the window's own theme.
+pub(crate) fn in_window_theme<T>(ctx: &egui::Context, add: impl FnOnce() -> T) -> T {
+    within(ctx, THEME.get(), add)
+}
+
 /// Draws a card over the view, and its menus, in the window's own theme.
 pub(crate) fn card<T>(ctx: &egui::Context, area: Area, add: impl FnOnce(&mut Ui) -> T) -> InnerResponse<T> {
-    within(ctx, THEME.get(), || area.show(ctx, |ui| overlay().show(ui, add).inner))
+    in_window_theme(ctx, || area.show(ctx, |ui| overlay().show(ui, add).inner))
 }
 
 /// UV rectangle of the centered part of an image that fills a place.
@@ -347,6 +352,22 @@ mod tests {
         let uv = filling(vec2(100.0, 300.0), vec2(200.0, 100.0));
         assert!((uv.width() - 1.0).abs() < 1e-6 && (uv.height() - 1.0 / 6.0).abs() < 1e-6, "{uv:?}");
         assert_eq!(uv.center(), egui::pos2(0.5, 0.5));
+    }
+
+    #[test]
+    fn a_menu_of_the_dark_view_has_the_theme_of_the_window() {
+        let (ctx, mut seen) = (egui::Context::default(), Vec::new());
+        ctx.set_theme(Theme::Light);
+        ctx.run_ui(egui::RawInput::default(), |ui| {
+            begin_frame(ui.ctx());
+            dark(ui, |ui| {
+                let theme = || ui.ctx().theme();
+                seen.extend([theme(), in_window_theme(ui.ctx(), theme), theme()]);
+            });
+        })
+        .textures_delta
+        .clear();
+        assert_eq!(seen[..3], [Theme::Dark, Theme::Light, Theme::Dark]);
     }
 
     #[test]

@@ -76,6 +76,7 @@ fn start_edit(app: &mut App, request: EditRequest, also: Option<PathBuf>, editin
     }
     let map = map.map_or_else(|| Arc::new(empty_map(&cloud)), |map| Arc::clone(&map));
     let (cloud, out, workspace) = (Arc::clone(&cloud), scene.out.clone(), Arc::clone(&app.workspace));
+    let adds = matches!(request, EditRequest::Apply(Edit::AddPiece { .. }));
     let change = move |observer: &mut dyn Observer| {
         let not_stored = |e| Stop::from(e).or_remedy("The change is not stored.");
         let new = workspace.edit_objects(&cloud, &map, &request, &out).map_err(not_stored)?;
@@ -87,9 +88,14 @@ fn start_edit(app: &mut App, request: EditRequest, also: Option<PathBuf>, editin
         Ok::<_, Stop>(new)
     };
     app.editing = Some(editing);
-    let started = app.start_in_scene(JobInfo::short("Editing objects"), change, |app, map| {
-        if map.is_some() {
-            app.state.set_semantics(map);
+    let started = app.start_in_scene(JobInfo::short("Editing objects"), change, move |app, map| {
+        if let Some(map) = map {
+            let newest = map.identities.iter().last().map(|(id, _)| id).filter(|_| adds);
+            app.state.set_semantics(Some(map));
+            // Not while the next one is being selected.
+            if newest.is_some() && !app.viewport.is_selecting() {
+                app.viewport.picking.select(newest);
+            }
         }
         ended(app);
     });

@@ -120,7 +120,7 @@ pub(super) fn show(ui: &Ui, shown: Rect, eye: &Camera, all: &[DrawnMeasurement],
 }
 
 /// Rectangles of the cards over the view, as of the last frame.
-fn cards_over(ctx: &Context, shown: Rect) -> Vec<Rect> {
+pub(super) fn cards_over(ctx: &Context, shown: Rect) -> Vec<Rect> {
     ctx.memory(|m| {
         let all = m.areas().visible_layer_ids().into_iter();
         let cards = all.filter(|layer| matches!(layer.order, Order::Middle | Order::Foreground));
@@ -143,7 +143,7 @@ fn show_labels(painter: &Painter, shown: Rect, cards: Vec<Rect>, labels: Vec<(Po
         if nearest.distance(at) > BESIDE + 2.0 {
             painter.add(Shape::line_segment([at, nearest], Stroke::new(1.0, color)));
         }
-        painter.rect_filled(rect, 5.0, Color32::from_black_alpha(205));
+        painter.rect_filled(rect, 5.0, Color32::from_black_alpha(235));
         painter.galley(rect.min + vec2(5.0, 3.0), galley, ink);
     }
 }

@@ -77,7 +77,12 @@ impl Viewport {
         if let Some(semantics) = state.semantics.as_ref().filter(|_| picks) {
             let under = views.area_under_pointer(ui, shown, has_other);
             let maps = self.queries.maps().map(|m| &***m).filter(|_| !on_camera && !under.is_other);
+            let before = self.picking.selected();
             self.picking.update(&response, under.shown, semantics, maps, &self.visibility, cx);
+            if matches!(&self.tool, Some(Tool::Transform(tool)) if tool.is_something()) {
+                // What is changed but not applied stays the selection.
+                self.picking.select(before);
+            }
         }
         let works_in = self.show_over_frames(ui, &areas, is_second, picks, route, cx);
         self.queries.work_in(works_in);
@@ -179,6 +184,11 @@ impl Viewport {
             if let Some((tool, mut rest)) = self.tool_in_use() {
                 tool.paint(ui, area, &mut rest, cx);
             }
+            // Outlines first: they run through no label.
+            let picked = state.semantics.as_ref().filter(|_| picks && !area.is_other);
+            if let Some((semantics, maps)) = picked.zip(self.queries.shown_maps()) {
+                self.picking.paint(ui, area.shown, semantics, maps);
+            }
             // A path that plays is shown as a video of it would be.
             let measures = cx.layout.measurements || self.is_measuring();
             if measures && !area.is_other && !route.is_some_and(|route| route.plays) {
@@ -186,13 +196,13 @@ impl Viewport {
             }
             let searched = state.semantics.as_ref().zip(self.cloud.as_ref()).filter(|_| !area.is_other);
             if let Some((semantics, cloud)) = searched.filter(|_| picks) {
-                if let Some(maps) = self.queries.shown_maps() {
-                    self.picking.paint(ui, area.shown, semantics, maps, &state.labels);
-                }
                 let (visibility, selected) = (&self.visibility, self.picking.selected());
                 let eye = self.display.overlay_camera(&self.eye, area.shown);
                 let marked = MarkedScene { cloud, semantics, visibility, selected, eye };
                 self.marks.show(ui, area.shown, &marked, &mut self.queries, cx);
+                if self.queries.shown_maps().is_some() {
+                    self.picking.paint_name(ui, area.shown, &semantics.identities, &state.labels);
+                }
             }
             if let Some(route) = route {
                 let eye = self.display.overlay_camera(&self.eye, area.rect);

@@ -281,11 +281,13 @@ fn the_chat_asks_by_buttons_and_says_where_another_scene_begins() {
     };
     let name = |a: &App| a.state.semantics.as_ref().map(|m| m.identities.name(1)).unwrap_or_default();
     assert!(!w.shows("Yes"));
-    let before = name(w.app());
+    let top = |w: &Window| w.harness.get_by_role_and_label(Role::TextInput, "Chat box").rect().top();
+    let (before, place) = (name(w.app()), top(&w));
     say(&mut w, "rename box 0 to crate");
     w.until("a question", |a| a.conversation().is_some_and(|talk| talk.contains("(yes or no)")));
     w.harness.run_steps(2);
     assert!(!w.shows("(yes or no)"), "there are buttons");
+    assert!((top(&w) - place).abs() < 1.0, "the box is where it was: {} {place}", top(&w));
     w.click("No");
     w.until("an answer", |a| a.conversation().is_some_and(|talk| talk.contains("leave it as it is")));
     w.harness.run_steps(2);

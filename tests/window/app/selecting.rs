@@ -109,6 +109,8 @@ fn a_click_selects_and_a_name_is_kept_and_asked_for() {
         w.until("it is kept", known);
         w.harness.run_steps(2);
         assert_eq!(w.shows("New object: click on it"), next);
+        let newest = w.app().state.semantics.as_ref().map(|m| m.identities.len() as u32);
+        assert_eq!(w.app().viewport.picking.selected() == newest, !next, "what was kept is selected");
     }
 }
 

@@ -132,9 +132,9 @@ fn the_card_of_a_tool_is_moved_by_its_title_and_folded_in_a_low_view() {
     let title = |w: &Window| w.harness.get_by_label_contains("New object: ").rect();
     let (before, card, eye) = (title(&w), area(&w, "selecting"), center(w.app()));
     let from = before.left_center() + vec2(20.0, 0.0);
-    drag(&mut w, [from, from - vec2(60.0, 90.0)], Modifiers::NONE);
+    drag(&mut w, [from, from + vec2(60.0, -90.0)], Modifiers::NONE);
     let moved = area(&w, "selecting");
-    assert!((moved.min - card.min - vec2(-60.0, -90.0)).length() < 12.0, "{card} {moved}");
+    assert!((moved.min - card.min - vec2(60.0, -90.0)).length() < 12.0, "{card} {moved}");
     assert!(center(w.app()) == eye && w.app().viewport.lines_drawn() == 0, "nothing else is dragged");
     let from = title(&w).left_center() + vec2(20.0, 0.0);
     drag(&mut w, [from, from - vec2(3000.0, 3000.0)], Modifiers::NONE);

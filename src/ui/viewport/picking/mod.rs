@@ -5,8 +5,9 @@
 
 mod menu;
 
-use egui::{Color32, ColorImage, FontId, Pos2, Rect, Response, TextureHandle, TextureOptions, Ui, pos2, vec2};
+use egui::{Color32, ColorImage, FontId, Pos2, Rect, Response, TextureHandle, TextureOptions, Ui, Vec2, pos2, vec2};
 
+use super::measured::cards_over;
 use super::outline;
 use super::visible::Visibility;
 use crate::jobs::query::ViewMaps;
@@ -39,8 +40,8 @@ pub struct Picking {
 pub(super) struct DrawnOutline {
     /// Generations of view and objects, and the identity that it was drawn for.
     of: Option<(u64, u64, IdentityId)>,
-    /// Its place in the view, px; `None` without pixels there.
-    at: Option<PixelBox>,
+    /// Its place in the view, px, and the size of that view; `None` without pixels there.
+    at: Option<(PixelBox, [usize; 2])>,
     texture: Option<TextureHandle>,
 }
 
@@ -100,20 +101,21 @@ impl Picking {
                 response.ctx.request_repaint();
             }
         }
-        response.context_menu(|ui| menu::show(ui, all, self.menu, visibility, cx));
+        let ctx = response.ctx.clone();
+        theme::in_window_theme(&ctx, || {
+            response.context_menu(|ui| menu::show(ui, all, self.menu, visibility, cx));
+        });
     }
 
-    /// Draws outlines over the frame in `shown`, and the name beside the cursor.
+    /// Draws outlines over the frame in `shown`.
     pub(super) fn paint(
         &mut self,
         ui: &Ui,
         shown: Rect,
         semantics: &Versioned<SemanticMap>,
         maps: &Versioned<ViewMaps>,
-        names: &ScreenNames,
     ) {
-        // While text is typed, a click is not expected.
-        let hovered = self.hovered.filter(|_| !ui.ctx().text_edit_focused());
+        let hovered = self.expected(ui);
         let [selected, pointed_at] = &mut self.outlines;
         if let Some(id) = self.selected {
             selected.paint(ui, shown, semantics, maps, id, |mask| outline::image(mask, SELECTED));
@@ -121,10 +123,19 @@ impl Picking {
         if let Some(id) = hovered.filter(|id| Some(*id) != self.selected) {
             pointed_at.paint(ui, shown, semantics, maps, id, |mask| outline::contour(mask, HOVERED));
         }
-        if let (Some(id), Some(pos)) = (hovered, ui.input(|i| i.pointer.hover_pos().filter(|pos| shown.contains(*pos))))
-        {
-            label(ui, shown, pos, &text::elided(&names.full_name(&semantics.identities, id), 60));
+    }
+
+    /// Draws the name of what is hovered beside the cursor, off the cards.
+    pub(super) fn paint_name(&self, ui: &Ui, shown: Rect, all: &Identities, names: &ScreenNames) {
+        let pos = ui.input(|i| i.pointer.hover_pos().filter(|pos| shown.contains(*pos)));
+        if let Some((id, pos)) = self.expected(ui).zip(pos) {
+            label(ui, shown, pos, &text::elided(&names.full_name(all, id), 60));
         }
+    }
+
+    /// Identity that a click would select. While text is typed, a click is not expected.
+    fn expected(&self, ui: &Ui) -> Option<IdentityId> {
+        self.hovered.filter(|_| !ui.ctx().text_edit_focused())
     }
 }
 
@@ -147,11 +158,16 @@ impl DrawnOutline {
                     Some(texture) => texture.set(image, TextureOptions::LINEAR),
                     None => self.texture = Some(ui.ctx().load_texture("outline", image, TextureOptions::LINEAR)),
                 }
-                at
+                (at, [map.width_px, map.height_px])
             });
         }
-        let (Some(at), Some(texture)) = (&self.at, &self.texture) else { return };
-        let scale = vec2(shown.width() / map.width_px as f32, shown.height() / map.height_px as f32);
+        self.paint_again(ui, shown);
+    }
+
+    /// Draws the last outline.
+    pub(super) fn paint_again(&self, ui: &Ui, shown: Rect) {
+        let (Some((at, [w, h])), Some(texture)) = (&self.at, &self.texture) else { return };
+        let scale = vec2(shown.width() / *w as f32, shown.height() / *h as f32);
         let corner = |x: usize, y: usize| shown.min + vec2(x as f32, y as f32) * scale;
         let rect = Rect::from_min_max(corner(at.x.start, at.y.start), corner(at.x.end, at.y.end));
         ui.painter().image(texture.id(), rect, Rect::from_min_max(pos2(0.0, 0.0), pos2(1.0, 1.0)), Color32::WHITE);
@@ -180,18 +196,22 @@ fn picked(all: &Identities, innermost: IdentityId, selected: Option<IdentityId>,
 /// Draws a name beside the cursor, inside the view.
 fn label(ui: &Ui, shown: Rect, pos: Pos2, name: &str) {
     let galley = ui.painter().layout_no_wrap(name.to_owned(), FontId::proportional(13.0), theme::text());
-    let size = galley.size() + vec2(12.0, 6.0);
-    let mut back = Rect::from_min_size(pos + vec2(16.0, 14.0), size);
-    // At the right and the lower border the name is on the other side of the cursor.
-    if back.right() > shown.right() {
-        back = back.translate(vec2(-size.x - 24.0, 0.0));
-    }
-    if back.bottom() > shown.bottom() {
-        back = back.translate(vec2(0.0, -size.y - 22.0));
-    }
-    let back = back.translate(vec2((shown.left() - back.left()).max(0.0), 0.0));
-    ui.painter().rect_filled(back, 5.0, Color32::from_black_alpha(205));
+    let back = beside_cursor(pos, galley.size() + vec2(12.0, 6.0), shown, &cards_over(ui.ctx(), shown));
+    ui.painter().rect_filled(back, 5.0, Color32::from_black_alpha(235));
     ui.painter().galley(back.min + vec2(6.0, 3.0), galley, theme::text());
+}
+
+/// Place of a name of this size beside the cursor: below it to the right, or on another side if that is outside the view
+/// or under a card.
+fn beside_cursor(pos: Pos2, size: Vec2, shown: Rect, cards: &[Rect]) -> Rect {
+    let (right, left, below, above) = (16.0, -size.x - 8.0, 14.0, -size.y - 8.0);
+    let sides = [vec2(right, below), vec2(left, below), vec2(right, above), vec2(left, above)];
+    let places = sides.map(|side| Rect::from_min_size(pos + side, size));
+    let is_inside = |place: &&Rect| shown.contains_rect(**place);
+    let is_free = |place: &&Rect| is_inside(place) && cards.iter().all(|card| !card.intersects(**place));
+    let found = places.iter().find(is_free).or_else(|| places.iter().find(is_inside));
+    let place = *found.unwrap_or(&places[2]);
+    place.translate(vec2((shown.left() - place.left()).max(0.0), 0.0))
 }
 
 #[cfg(test)]
@@ -221,6 +241,21 @@ mod tests {
         assert_eq!(picked(&all, table, Some(table), false), table, "nothing is around it");
         assert_eq!(picked(&all, eye, Some(table), false), eye, "another object is selected");
         assert_eq!((picked(&all, eye, None, true), picked(&all, eye, Some(doll), true)), (doll, doll), "Alt");
+    }
+
+    #[test]
+    fn a_name_beside_the_cursor_is_in_the_view_and_under_no_card() {
+        let shown = Rect::from_min_size(pos2(0.0, 0.0), vec2(400.0, 300.0));
+        let card = Rect::from_min_size(pos2(10.0, 250.0), vec2(150.0, 40.0));
+        let size = vec2(90.0, 20.0);
+        let place = |pos: Pos2, cards: &[Rect]| beside_cursor(pos, size, shown, cards);
+        let below = place(pos2(60.0, 235.0), &[]);
+        assert!(below.top() > 235.0 && below.intersects(card), "control: it is below the cursor");
+        let above = place(pos2(60.0, 235.0), &[card]);
+        assert!(above.bottom() < 235.0 && !above.intersects(card) && shown.contains_rect(above), "{above}");
+        for corner in [pos2(1.0, 1.0), pos2(399.0, 1.0), pos2(1.0, 299.0), pos2(399.0, 299.0)] {
+            assert!(shown.contains_rect(place(corner, &[card])), "{corner}");
+        }
     }
 
     #[test]

@@ -6,8 +6,9 @@ use egui::{Align2, Area, CursorIcon, Id, Label, Order, Pos2, Rect, RichText, Sen
 
 use crate::ui::theme;
 
-/// Height of a view below which a tall card begins folded, points.
-const LOW_PT: f32 = 560.0;
+/// Size of a view below which a card begins folded: unfolded it would take more than a third of the height, points.
+const LOW_PT: f32 = 700.0;
+const NARROW_PT: f32 = 480.0;
 
 /// Place and form of a card that the user chose.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -26,7 +27,8 @@ pub(super) struct ToolCard {
     pivot: Align2,
     at: Pos2,
     order: Order,
-    width: Option<f32>,
+    /// Width folded and unfolded.
+    width: Option<[f32; 2]>,
     folds: bool,
 }
 
@@ -47,25 +49,34 @@ impl ToolCard {
     ) -> Self {
         let (pivot, order) = (Align2::CENTER_BOTTOM, Order::Foreground);
         let at = pivot.pos_in_rect(&rect.shrink(52.0));
-        let width = Some((rect.width() - 40.0).clamp(*width.start(), *width.end()));
+        let width = Some([(rect.width() - 40.0).clamp(*width.start(), *width.end()); 2]);
         Self { id, title: title.into(), rect, pivot, at, order, width, folds: false }
     }
 
-    /// A card that has a button to fold it, and begins folded in a low view.
-    pub(super) fn folding(self) -> Self {
-        Self { folds: true, ..self }
+    /// A card that has a button to fold it, and begins folded in a small view; as wide as fits, up to these widths.
+    pub(super) fn folding(self, folded_pt: f32, unfolded_pt: f32) -> Self {
+        let room = (self.rect.width() - 40.0).max(200.0);
+        Self { folds: true, width: Some([folded_pt.min(room), unfolded_pt.min(room)]), ..self }
+    }
+
+    /// A card in the corner on the right.
+    pub(super) fn on_the_right(self) -> Self {
+        let pivot = Align2::RIGHT_BOTTOM;
+        Self { at: pivot.pos_in_rect(&self.rect.shrink(12.0)) - vec2(0.0, 40.0), pivot, ..self }
     }
 
     /// Draws it; `add` draws the rows below the title, and is told whether only the main ones are wanted.
     pub(super) fn show(self, ui: &Ui, add: impl FnOnce(&mut Ui, bool)) {
         let Self { id, title, rect, pivot, at, order, width, folds } = self;
-        let key = Id::unique(id).with("form");
+        // What was moved on one side has its own place on the other.
+        let key = Id::unique(id).with(("form", pivot == Align2::RIGHT_BOTTOM));
         let before = ui.data(|d| d.get_temp::<ChosenForm>(key)).unwrap_or_default();
         let mut form = before;
-        let is_folded = folds && !form.unfolded.unwrap_or(rect.height() >= LOW_PT);
+        let is_large = rect.height() >= LOW_PT && rect.width() >= NARROW_PT;
+        let is_folded = folds && !form.unfolded.unwrap_or(is_large);
         let area = Area::new(Id::unique(id)).order(order).pivot(pivot).fixed_pos(at + form.moved);
         let drawn = theme::card(ui.ctx(), area.constrain_to(rect), |ui| {
-            width.into_iter().for_each(|width| ui.set_width(width));
+            width.into_iter().for_each(|width| ui.set_width(width[usize::from(!is_folded)]));
             let handle = ui.horizontal(|ui| {
                 if folds {
                     let (symbol, text) = match is_folded {
@@ -76,7 +87,8 @@ impl ToolCard {
                         form.unfolded = Some(is_folded);
                     }
                 }
-                let label = Label::new(RichText::new(title).strong()).selectable(false).truncate();
+                let label = Label::new(RichText::new(title).strong()).selectable(false);
+                let label = if folds { label.wrap() } else { label.truncate() };
                 // Not for the keyboard: only the place of the card is at stake.
                 ui.add(label.sense(Sense::DRAG | Sense::CLICK))
             });

@@ -17,6 +17,11 @@ use crate::ui::state::{AppState, Tone};
 use crate::ui::{keys, theme};
 use crate::worker::{JobInfo, QueueFull, Task, Tasks};
 
+/// Height of the rows of the card around the properties, points.
+const ROWS_PT: f32 = 125.0;
+/// Height of the cards above and below it, points.
+const AROUND_PT: f32 = 156.0;
+
 /// Title of the job.
 const TITLE: &str = "Inspecting a pixel";
 /// Outline of a Gaussian, standard deviations.
@@ -94,7 +99,9 @@ impl ViewTool for Inspector {
         let shown = places.first_frame;
         ToolCard::in_corner("inspector", "Inspect Gaussians", shown).show(ui, |ui, _| {
             ui.set_width((shown.width() - 44.0).clamp(120.0, 330.0));
-            card(ui, self, (shown.height() - 330.0).clamp(90.0, 420.0), cx);
+            // Up to two thirds of the view, below the cards at its top.
+            let most = (shown.height() * 2.0 / 3.0).min(shown.height() - AROUND_PT);
+            card(ui, self, (most - ROWS_PT).max(90.0), cx);
         });
     }
 }

@@ -1,7 +1,7 @@
 //! Measuring in the view: clicks put points on surfaces, which make a length, an angle or an area; of a selected object
 //! the upright box is measured. A length sets the scene's scale, an area the floor.
 
-use egui::{Button, Key, Response, RichText, ScrollArea, TextEdit, Ui};
+use egui::{Button, Key, Response, RichText, ScrollArea, TextEdit, TextStyle, Ui};
 use glam::{DVec2, DVec3};
 
 use super::super::display::Display;
@@ -23,8 +23,12 @@ use crate::ui::{keys, theme};
 use crate::worker::Versioned;
 use crate::worker::view::ViewPicture;
 
-/// Height of the list of kept measurements, points.
-const LIST_PT: f32 = 96.0;
+/// Height of the list of kept measurements, three rows, points.
+const LIST_PT: f32 = 88.0;
+/// Width of the button that deletes one, with the gaps, points.
+const DELETE_PT: f32 = 64.0;
+/// Width of a view that has room for the field of the true length in a folded card, points.
+const WITH_SCALE_PT: f32 = 480.0;
 
 /// The points so far, and the text typed beside them.
 #[derive(Clone, Debug)]
@@ -214,8 +218,10 @@ impl ViewTool for Ruler {
     fn card(&mut self, ui: &Ui, places: CardPlaces, scene: &mut ToolScene<'_>, cx: &mut Ctx<'_>) {
         let state = cx.state;
         // What grows is at the top, so that the rest stays under the pointer.
-        let card = ToolCard::at_bottom("ruler", "Measure", places.active_view, 260.0..=470.0).folding();
+        let card = ToolCard::in_corner("ruler", "Measure", places.active_view).folding(340.0, 450.0);
+        let has_room = places.active_view.width() >= WITH_SCALE_PT;
         card.show(ui, |ui, is_folded| {
+            ui.spacing_mut().item_spacing.y = 5.0;
             if !is_folded {
                 list(ui, scene.measurements, meters_per_unit(state), cx);
             }
@@ -241,7 +247,7 @@ impl ViewTool for Ruler {
                 if ui.add_enabled(has_points, Button::new("Clear")).clicked() {
                     (self.points, self.waiting) = (Vec::new(), Vec::new());
                 }
-                if let Ok(value) = &value {
+                if let Some(value) = value.as_ref().ok().filter(|_| has_room || !is_folded) {
                     self.uses(ui, value, scene.eye.center, cx);
                 }
             });
@@ -273,7 +279,11 @@ fn list(ui: &mut Ui, all: &mut Vec<Measurement>, meters: Option<f64>, cx: &mut C
                 let tick = ui.checkbox(&mut is_shown, "").on_hover_text("Show it in the view.");
                 tick.accessible_name(format!("{} is visible", m.name));
                 m.hidden = !is_shown;
-                let name = TextEdit::singleline(&mut m.name).desired_width(120.0).char_limit(80).hint_text("Name");
+                // The name has what the value leaves.
+                let font = TextStyle::Body.resolve(ui.style());
+                let value_pt = ui.painter().layout_no_wrap(m.text(meters), font, theme::text()).size().x;
+                let name_pt = (ui.available_width() - value_pt - DELETE_PT).max(90.0);
+                let name = TextEdit::singleline(&mut m.name).desired_width(name_pt).char_limit(80).hint_text("Name");
                 if ui.add(name).accessible_name(format!("Name of measurement {}", i + 1)).changed() {
                     m.name = text::line(&m.name).into_owned();
                 }

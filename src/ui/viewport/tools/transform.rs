@@ -10,7 +10,7 @@ use super::card::ToolCard;
 use super::crop::{on_screen, travel};
 use super::{CardPlaces, ToolScene, ViewTool};
 use crate::jobs::rearrange::{Arrangement, SplatEdit, apply};
-use crate::scene::{Bounds, Camera, GaussianCloud, Identities, NO_IDENTITY, SemanticMap};
+use crate::scene::{Bounds, Camera, GaussianCloud, Identities, IdentityId, NO_IDENTITY, SemanticMap};
 use crate::ui::actions::Action;
 use crate::ui::ctx::Ctx;
 use crate::ui::theme;
@@ -33,6 +33,10 @@ pub(crate) struct TransformTool {
     /// Center and half the diagonal of the object or part before the arrangement.
     middle: DVec3,
     radius: f64,
+    /// The selection at the last redraw; a new one is followed while nothing is changed.
+    selected: Option<Option<IdentityId>>,
+    /// True if the card is in the corner on the right, away from the thing; `None` before the first redraw.
+    on_the_right: Option<bool>,
     /// The preview, with the Gaussians and objects that it was made from.
     shown: Option<TransformPreview>,
 }
@@ -48,7 +52,16 @@ impl TransformTool {
         let places = map.members(id).into_iter().filter(|i| *i < cloud.len()).map(|i| cloud.world_position(i));
         let bounds = Bounds::robust(places);
         let (middle, radius) = bounds.map_or((DVec3::ZERO, 1.0), |b| (b.center(), b.radius()));
-        Self { arrangement: Arrangement::of(id), degrees: 0.0, up, middle, radius, shown: None }
+        Self {
+            arrangement: Arrangement::of(id),
+            degrees: 0.0,
+            up,
+            middle,
+            radius,
+            selected: None,
+            on_the_right: None,
+            shown: None,
+        }
     }
 
     /// The arrangement so far.
@@ -56,7 +69,8 @@ impl TransformTool {
         self.arrangement
     }
 
-    fn is_something(&self) -> bool {
+    /// True if anything is changed.
+    pub(crate) fn is_something(&self) -> bool {
         self.arrangement != Arrangement::of(self.arrangement.id)
     }
 
@@ -77,6 +91,12 @@ impl TransformTool {
             self.shown = Some(TransformPreview { of, cloud, map });
         }
         self.shown.as_ref().map(|shown| (shown.cloud.clone(), shown.map.clone()))
+    }
+
+    /// Another identity that was selected since the last redraw, while nothing is changed.
+    fn follows(&mut self, selected: Option<IdentityId>) -> Option<IdentityId> {
+        let before = self.selected.replace(selected)?;
+        selected.filter(|id| before != selected && *id != self.arrangement.id && !self.is_something())
     }
 
     /// Draws the arrows for dragging along the axes.
@@ -107,7 +127,9 @@ impl TransformTool {
     fn show_card(&mut self, ui: &Ui, rect: Rect, all: &Identities, cx: &mut Ctx<'_>) {
         let name = all.full_name(self.arrangement.id);
         let title = format!("Move \u{201c}{name}\u{201d}: drag an arrow or type values");
-        ToolCard::in_corner("arranging", title, rect).show(ui, |ui, _| {
+        let card = ToolCard::in_corner("arranging", title, rect);
+        let card = if self.on_the_right == Some(true) { card.on_the_right() } else { card };
+        card.show(ui, |ui, _| {
             // Fields are in meters where the scale is known, as lengths are elsewhere.
             let meters = cx.state.scene.as_ref().and_then(|scene| scene.meters_per_unit());
             let (scale, unit) = meters.map_or((1.0, "units"), |meters| (meters, "m"));
@@ -191,10 +213,17 @@ impl ViewTool for TransformTool {
         }
     }
 
-    fn card(&mut self, ui: &Ui, places: CardPlaces, _scene: &mut ToolScene<'_>, cx: &mut Ctx<'_>) {
+    fn card(&mut self, ui: &Ui, places: CardPlaces, scene: &mut ToolScene<'_>, cx: &mut Ctx<'_>) {
+        let shown = places.first_frame;
+        let middle = self.middle + self.arrangement.to.shift;
+        let is_left = || Some(scene.camera(shown).project(middle)?.x < 0.5 * f64::from(shown.width()));
+        self.on_the_right.get_or_insert_with(|| is_left().unwrap_or(false));
+        if let Some(next) = self.follows(scene.picking.selected()) {
+            cx.ask(Action::Transform(next));
+        }
         let (before, none, state) = (self.arrangement, Identities::default(), cx.state);
         let all = state.semantics.as_ref().map_or(&none, |map| &map.identities);
-        self.show_card(ui, places.first_frame, all, cx);
+        self.show_card(ui, shown, all, cx);
         if self.arrangement != before {
             ui.ctx().request_repaint();
         }
@@ -206,6 +235,20 @@ mod tests {
     use super::*;
     use crate::jobs::rearrange::Placement;
     use crate::scene::Level;
+
+    #[test]
+    fn another_selection_is_followed_while_nothing_is_changed() {
+        let cloud = GaussianCloud::isotropic(vec![[0.0; 3]; 2], -3.0, 2.0);
+        let mut all = Identities::default();
+        all.add(Level::Object, NO_IDENTITY, vec!["mug".into()]);
+        let map = SemanticMap::from_identities(all, vec![1, 1], vec![1.0; 2], vec![]);
+        let mut tool = TransformTool::new(1, &cloud, &map, DVec3::Y);
+        assert_eq!(tool.follows(Some(2)), None, "it was begun for another one than the selection");
+        assert_eq!((tool.follows(Some(2)), tool.follows(Some(1)), tool.follows(None)), (None, None, None));
+        assert_eq!(tool.follows(Some(2)), Some(2));
+        tool.arrangement.duplicate = true;
+        assert_eq!(tool.follows(Some(3)), None, "a change is not lost");
+    }
 
     #[test]
     fn the_preview_is_what_is_kept_and_nothing_is_shown_before_a_change() {

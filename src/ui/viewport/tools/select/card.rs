@@ -1,6 +1,6 @@
 //! The card of the selection: shape, changes, and what becomes of it.
 
-use egui::{Button, ComboBox, Key, ProgressBar, Rect, Slider, TextEdit, Ui, vec2};
+use egui::{Button, ComboBox, Key, ProgressBar, Rect, RichText, Slider, TextEdit, Ui, vec2};
 use strum::VariantArray;
 
 use super::super::ToolScene;
@@ -15,7 +15,7 @@ use crate::ui::labels::sentence;
 use crate::ui::select_shape::SelectShape;
 use crate::ui::{keys, theme};
 
-/// Draws the card at the bottom of the view in `rect`.
+/// Draws the card in a corner of the view in `rect`.
 pub(super) fn show(tool: &mut SelectTool, ui: &Ui, rect: Rect, scene: &ToolScene<'_>, cx: &mut Ctx<'_>) {
     let (none, state) = (Identities::default(), cx.state);
     let all = state.semantics.as_ref().map_or(&none, |map| &map.identities);
@@ -25,14 +25,14 @@ pub(super) fn show(tool: &mut SelectTool, ui: &Ui, rect: Rect, scene: &ToolScene
         SelectFor::Extent(id) => format!("Correct {}", all.full_name(id)),
     };
     let title = format!("{what}: {}", tool.shape.hint());
-    ToolCard::at_bottom("selecting", title, rect, 220.0..=470.0).folding().show(ui, |ui, is_folded| {
+    ToolCard::in_corner("selecting", title, rect).folding(400.0, 400.0).show(ui, |ui, is_folded| {
+        ui.spacing_mut().item_spacing.y = 5.0;
         if !is_folded {
-            ui.weak("Shift removes. Backspace undoes. Right-drag and wheel move the view.");
+            let text = "Shift removes. Backspace undoes. Right-drag and wheel move the view.";
+            ui.label(RichText::new(text).small().color(theme::weak()));
         }
         ui.horizontal_wrapped(|ui| {
-            if is_folded {
-                (ui.spacing_mut().item_spacing.x, ui.spacing_mut().button_padding) = (1.0, vec2(5.0, 2.0));
-            }
+            (ui.spacing_mut().item_spacing.x, ui.spacing_mut().button_padding) = (1.0, vec2(5.0, 2.0));
             for shape in SelectShape::VARIANTS {
                 let button = ui.selectable_label(tool.shape == *shape, sentence(<&str>::from(shape)));
                 if button.on_hover_text(sentence(shape.hint())).clicked() {
@@ -67,6 +67,7 @@ pub(super) fn show(tool: &mut SelectTool, ui: &Ui, rect: Rect, scene: &ToolScene
                 whole.response.accessible_name("What it becomes");
             });
         }
+        status(tool, ui, scene, cx);
         ui.horizontal(|ui| {
             if ui.add_enabled(!tool.is_empty(), theme::primary_button("Keep")).clicked() {
                 cx.ask(Action::AddPainted);
@@ -92,7 +93,6 @@ pub(super) fn show(tool: &mut SelectTool, ui: &Ui, rect: Rect, scene: &ToolScene
             if ui.button("Cancel").clicked() {
                 cx.ask(Action::SegmentNew(None));
             }
-            status(tool, ui, scene, cx);
         });
     });
     if !keys::is_typing(ui.ctx()) && ui.input(|i| i.key_pressed(Key::Backspace)) && tool.has_steps() {
@@ -151,8 +151,18 @@ fn changes(tool: &mut SelectTool, ui: &mut Ui, scene: &ToolScene<'_>) {
     });
 }
 
-/// Draws the state of the selection.
+/// Draws the state of the selection, and what it takes from a known object, in a row of its own: the buttons below keep
+/// their place.
 fn status(tool: &SelectTool, ui: &mut Ui, scene: &ToolScene<'_>, cx: &Ctx<'_>) {
+    ui.horizontal(|ui| count(tool, ui, scene, cx));
+    let all = cx.state.semantics.as_ref().map(|map| &map.identities);
+    if let Some((all, taken)) = all.zip(tool.taken_object()) {
+        let text = taken.text(&cx.state.labels.full_name(all, taken.from));
+        ui.colored_label(theme::warning(), text);
+    }
+}
+
+fn count(tool: &SelectTool, ui: &mut Ui, scene: &ToolScene<'_>, cx: &Ctx<'_>) {
     let text = match &tool.selected {
         _ if tool.running.is_some() => {
             ui.spinner();
@@ -165,8 +175,7 @@ fn status(tool: &SelectTool, ui: &mut Ui, scene: &ToolScene<'_>, cx: &Ctx<'_>) {
             "Preparing\u{2026}".to_owned()
         }
         Some(s) if s.id != NO_IDENTITY => format::things(s.gaussians.len(), "Gaussian"),
-        Some(_) => "Nothing is selected".to_owned(),
-        None => String::new(),
+        _ => "Nothing is selected".to_owned(),
     };
     ui.weak(text);
 }

@@ -4,6 +4,7 @@
 mod card;
 mod line;
 mod reach;
+mod taken;
 
 use std::collections::VecDeque;
 use std::sync::Arc;
@@ -12,6 +13,7 @@ use egui::{Color32, PointerButton, Response, Stroke as Line, Ui};
 use glam::DVec2;
 
 use self::line::DrawnLine;
+use self::taken::TakenObject;
 use super::super::outline;
 use super::super::picking::{DrawnOutline, innermost};
 use super::super::splat_selection::SplatSelection;
@@ -19,12 +21,13 @@ use super::super::split::ViewArea;
 use super::preparation::SelectionPreparation;
 use super::{CardPlaces, ToolScene, ViewTool};
 use crate::jobs::select::{self, SelectFor, SelectRequest, SelectStep, Selected, Stroke, kept_as};
+use crate::navigate::Pose;
 use crate::pipeline::semantics::lifting::edit::Edit;
 use crate::scene::{Camera, GaussianCloud, NO_IDENTITY, SemanticMap};
 use crate::ui::ctx::Ctx;
 use crate::ui::select_shape::SelectShape;
 use crate::ui::state::{AppState, Tone};
-use crate::worker::{JobInfo, Task, Tasks, Versioned, ViewMode};
+use crate::worker::{JobInfo, Task, Tasks, Versioned};
 
 /// Title of the jobs.
 const TITLE: &str = "Selecting";
@@ -69,10 +72,14 @@ pub(crate) struct SelectTool {
     /// True if preparation has failed; the next stroke tries again.
     gave_up: bool,
     selected: Option<Arc<Selected>>,
+    /// Objects that lose most of their Gaussians to it; `None` until they are known.
+    taken: Option<Vec<TakenObject>>,
     /// Objects and parts with the selection applied.
     preview: Option<Versioned<SemanticMap>>,
     marked: Option<Arc<SplatSelection>>,
     drawn: DrawnOutline,
+    /// Pose of the view of that outline.
+    drawn_at: Option<Pose>,
 }
 
 impl SelectTool {
@@ -97,9 +104,11 @@ impl SelectTool {
             is_prepared: false,
             gave_up: false,
             selected: None,
+            taken: None,
             preview: None,
             marked: None,
             drawn: DrawnOutline::default(),
+            drawn_at: None,
         }
     }
 
@@ -116,7 +125,7 @@ impl SelectTool {
         if let Ok(selected) = result {
             self.preview = Some(Versioned::new(Arc::clone(&selected.preview)));
             self.selected = Some(Arc::new(selected));
-            self.marked = None;
+            (self.marked, self.taken) = (None, None);
         }
     }
 
@@ -187,6 +196,12 @@ impl SelectTool {
 
     pub(crate) fn preview(&self) -> Option<&Versioned<SemanticMap>> {
         self.preview.as_ref()
+    }
+
+    /// The object that loses the most to the selection, if that is most of it and not what the selection is for.
+    fn taken_object(&self) -> Option<TakenObject> {
+        let map = &self.selected.as_ref()?.preview;
+        self.taken.iter().flatten().find(|taken| taken.surprises(&self.purpose, map)).copied()
     }
 
     fn is_empty(&self) -> bool {
@@ -260,7 +275,7 @@ impl SelectTool {
                 let ball = |middle| (middle, f64::from(line.radius_pt) * scene.eye.units_per_px(middle, points_px));
                 reach::in_balls(cloud, drawn, &middles.map(ball).collect::<Vec<_>>())
             }
-            SelectShape::Color => match color_at(at(last), area, scene, cx) {
+            SelectShape::Color => match reach::color_at(at(last), area, scene, cx) {
                 Some(color) => reach::of_color(cloud, drawn, color, self.tolerance),
                 None => Vec::new(),
             },
@@ -304,18 +319,6 @@ impl SelectTool {
     }
 }
 
-/// Color of the frame at a relative place of a view. Other modes show colors that no Gaussian has, and another scene
-/// has other Gaussians.
-fn color_at(at: DVec2, area: ViewArea, scene: &ToolScene<'_>, cx: &mut Ctx<'_>) -> Option<[u8; 3]> {
-    if *cx.layout.mode_of(area.second) != ViewMode::Rgb || area.is_other {
-        return None;
-    }
-    let pixels = scene.display.picture()?.pixels(area.second).ok()?;
-    let x = ((at.x * f64::from(pixels.width_px)) as u32).min(pixels.width_px - 1);
-    let y = ((at.y * f64::from(pixels.height_px)) as u32).min(pixels.height_px - 1);
-    pixels.rgb.get((y * pixels.width_px + x) as usize).copied()
-}
-
 impl ViewTool for SelectTool {
     fn takes_drags(&self) -> bool {
         true
@@ -327,6 +330,11 @@ impl ViewTool for SelectTool {
 
     fn update(&mut self, scene: &mut ToolScene<'_>, state: &mut AppState, tasks: &Tasks) {
         self.take_result();
+        if self.taken.is_none()
+            && let (Some(map), Some(gaussians)) = (&state.semantics, self.gaussians())
+        {
+            self.taken = Some(TakenObject::all_of(map, gaussians));
+        }
         if let Some(cloud) = scene.cloud {
             self.begin_next(scene.preparation, cloud, state, tasks);
         }
@@ -366,10 +374,18 @@ impl ViewTool for SelectTool {
             return;
         }
         let shown = area.shown;
-        if let (Some(maps), Some(preview), Some(selected)) = (scene.queries.shown_maps(), &self.preview, &self.selected)
+        if let (Some(preview), Some(selected)) = (&self.preview, &self.selected)
             && selected.id != NO_IDENTITY
         {
-            self.drawn.paint(ui, shown, preview, maps, selected.id, |mask| outline::image(mask, SELECTED));
+            match scene.queries.shown_maps() {
+                Some(maps) => {
+                    self.drawn.paint(ui, shown, preview, maps, selected.id, |mask| outline::image(mask, SELECTED));
+                    self.drawn_at = Some(scene.pose);
+                }
+                // Until the changed view is there, the last outline stays.
+                None if self.drawn_at == Some(scene.pose) => self.drawn.paint_again(ui, shown),
+                None => {}
+            }
         }
         self.drawn_lines.iter().chain(self.line.iter().map(|(line, _)| line)).for_each(|line| line.paint(ui, shown));
         let has_tip = matches!(self.shape, SelectShape::Click | SelectShape::Brush | SelectShape::Sphere);

@@ -1,14 +1,30 @@
 //! Gaussians that a shape takes: under pixels of the view, in a ball, of a color.
 
-use glam::DVec3;
+use glam::{DVec2, DVec3};
 
+use super::super::super::split::ViewArea;
+use super::super::ToolScene;
 use crate::scene::{Camera, GaussianCloud, Mask};
+use crate::ui::ctx::Ctx;
+use crate::worker::ViewMode;
 
 /// Largest depth of a center behind the rendered surface to count as on it, as a share of its depth.
 const ON_SURFACE: f64 = 0.02;
 
 /// Numbers of the drawn Gaussians; `None` draws all.
 pub(super) type DrawnOnly<'a> = Option<&'a [usize]>;
+
+/// Color of the frame at a relative place of a view. Other modes show colors that no Gaussian has, and another scene
+/// has other Gaussians.
+pub(super) fn color_at(at: DVec2, area: ViewArea, scene: &ToolScene<'_>, cx: &mut Ctx<'_>) -> Option<[u8; 3]> {
+    if *cx.layout.mode_of(area.second) != ViewMode::Rgb || area.is_other {
+        return None;
+    }
+    let pixels = scene.display.picture()?.pixels(area.second).ok()?;
+    let x = ((at.x * f64::from(pixels.width_px)) as u32).min(pixels.width_px - 1);
+    let y = ((at.y * f64::from(pixels.height_px)) as u32).min(pixels.height_px - 1);
+    pixels.rgb.get((y * pixels.width_px + x) as usize).copied()
+}
 
 fn all_drawn(cloud: &GaussianCloud, drawn: DrawnOnly<'_>, takes: impl Fn(usize) -> bool) -> Vec<u32> {
     match drawn {
