@@ -2,7 +2,6 @@
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use std::time::Instant;
 
 use glam::DMat3;
 
@@ -15,7 +14,6 @@ use crate::pipeline::semantics::lifting::splat_tree::hierarchy::Hierarchy;
 pub use crate::pipeline::semantics::lifting::splat_tree::marks::Stroke;
 use crate::pipeline::semantics::lifting::splat_tree::marks::StrokeMarks;
 use crate::pipeline::semantics::lifting::splat_tree::stored;
-use crate::pipeline::semantics::query::timing::ms_since;
 use crate::render::{RenderSettings, Renderer};
 use crate::scene::{Camera, GaussianCloud, HomeView, Identities, IdentityId, NO_IDENTITY, SemanticMap};
 
@@ -114,8 +112,6 @@ pub struct Selected {
     /// Objects and parts with the selection, and its identity among them; `NO_IDENTITY` if nothing is selected.
     pub(crate) preview: Arc<SemanticMap>,
     pub(crate) id: IdentityId,
-    /// Milliseconds that the step took.
-    pub(crate) ms: f64,
 }
 
 impl Selected {
@@ -155,7 +151,6 @@ fn keep(file: &Path, bytes: &[u8]) -> Result<(), JobError> {
 /// Carries out a step of a selection.
 pub(crate) fn run(request: &SelectRequest, observer: &mut dyn Observer) -> Result<Selected, JobError> {
     let SelectRequest { cloud, settings, map, purpose, prepared, before, step } = request;
-    let start = Instant::now();
     // Steps refer to Gaussians by number.
     let (mut now, mut earlier, mut neighbors) = match before.as_ref().filter(|before| before.of == cloud.len()) {
         Some(before) => (before.now.clone(), before.earlier.clone(), before.neighbors.clone()),
@@ -203,7 +198,6 @@ pub(crate) fn run(request: &SelectRequest, observer: &mut dyn Observer) -> Resul
     }
     let of = selected(&now);
     let gaussians: Vec<u32> = (0..cloud.len() as u32).filter(|i| of[*i as usize]).collect();
-    let ms = ms_since(start);
     let (preview, id) = if gaussians.is_empty() {
         (Arc::clone(map), NO_IDENTITY)
     } else {
@@ -214,7 +208,7 @@ pub(crate) fn run(request: &SelectRequest, observer: &mut dyn Observer) -> Resul
         };
         (Arc::new(preview), id)
     };
-    Ok(Selected { now, earlier, of: cloud.len(), neighbors, gaussians, preview, id, ms })
+    Ok(Selected { now, earlier, of: cloud.len(), neighbors, gaussians, preview, id })
 }
 
 /// Returns the Gaussians with which a selection begins, indices.
