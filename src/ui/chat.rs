@@ -341,15 +341,6 @@ impl Agent {
         };
         let identities = World::identities(world);
         let offers = missing.map(|missing| offers(&said, identities, missing)).unwrap_or_default();
-<<<<<<< HEAD
-        let answer = if offers.is_empty() {
-            ChatAnswer { candidates, refused: reply.refused, asks, ..ChatAnswer::new(&text) }
-        } else {
-            let part = part_not_understood(&said, identities);
-            let part = part.map(|p| format!("Not understood: \u{201c}{p}\u{201d}. Nothing was done. "));
-            let text = part.unwrap_or_default() + NOT_BY_CHAT;
-            ChatAnswer { offers, ..ChatAnswer::new(&text) }
-=======
         let answer = match offers.is_empty() {
             true => ChatAnswer { candidates, refused: reply.refused, asks, ..ChatAnswer::new(&text) },
             false => {
@@ -357,7 +348,6 @@ impl Agent {
                 let part = part.map(|p| format!("Not understood: \u{201c}{p}\u{201d}. Nothing was done. "));
                 ChatAnswer { offers, ..ChatAnswer::new(&(part.unwrap_or_default() + NOT_BY_CHAT)) }
             }
->>>>>>> f-y
         };
         self.reply(answer, transcript);
     }
