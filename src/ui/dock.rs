@@ -81,7 +81,7 @@ fn wide() -> Tree<Place> {
     let work = tabs(&mut tiles, &[Pane::Training, Pane::Objects, Pane::Clean, Pane::Models, Pane::Plan]);
     let talk = tabs(&mut tiles, &[Pane::Chat, Pane::Query]);
     let right = tiles.insert_vertical_tile(vec![work, talk]);
-    share(&mut tiles, right, work, 1.6);
+    share(&mut tiles, right, work, 1.9);
     let root = tiles.insert_horizontal_tile(vec![photos, middle, right]);
     share(&mut tiles, root, photos, 250.0);
     share(&mut tiles, root, right, 350.0);

@@ -45,7 +45,6 @@ pub(crate) struct ViewState {
 pub(crate) struct EditSnapshot {
     /// Number of the scene; changes of another scene are forgotten.
     pub(crate) scene: u64,
-    /// Folder of the scene: a copy is derived at the first change of Gaussians.
     pub(crate) folder: PathBuf,
     pub(crate) map: Option<Arc<SemanticMap>>,
     /// The Gaussians, if they are a result.
@@ -254,15 +253,14 @@ fn shown_text(before: &BTreeSet<IdentityId>, now: &BTreeSet<IdentityId>, all: &I
         ids.iter().copied().filter(|id| all.get(*id).is_some() && !whole(id)).collect()
     };
     let drawn: BTreeSet<IdentityId> = all.iter().map(|(id, _)| id).filter(|id| !now.contains(id)).collect();
-    if let (true, [_] | [_, _]) = (now.contains(&NO_IDENTITY), outermost(&drawn).as_slice()) {
-        let only: Vec<String> = outermost(&drawn).into_iter().map(|id| all.full_name(id)).collect();
-        return format!("showed only {}", only.join(" and "));
-    }
     let named = |ids: BTreeSet<IdentityId>| match outermost(&ids).as_slice() {
         [one] => all.full_name(*one),
         [one, other] => format!("{} and {}", all.full_name(*one), all.full_name(*other)),
         more => format!("{} objects and parts", count(more.len() as u64)),
     };
+    if let (true, [_] | [_, _]) = (now.contains(&NO_IDENTITY), outermost(&drawn).as_slice()) {
+        return format!("showed only {}", named(drawn));
+    }
     let (gone, back): (BTreeSet<_>, BTreeSet<_>) = (now - before, before - now);
     match (gone.is_empty(), back.is_empty()) {
         (false, true) => format!("hid {}", named(gone)),

@@ -12,6 +12,8 @@ use crate::io::{IoError, files, gs_output, splat_ply};
 
 /// Start of the properties' names.
 pub(super) const PREFIX: &str = "clip_f_indices_";
+/// Property beside them.
+pub(super) const UNCERTAINTY: &str = "uncertainty";
 /// Columns of the codebook that are CLIP's; DINO's follow.
 const CLIP: usize = 512;
 
@@ -20,7 +22,7 @@ pub(super) fn read(splat: &Path, options: &ResultOptions) -> Result<MethodResult
     let mut cloud = splat_ply::read(splat)?;
     let names: Vec<String> = (0..rows::count(&cloud, PREFIX)).map(|k| format!("{PREFIX}{k}")).collect();
     let codes = rows::take(&mut cloud, &names, splat)?;
-    rows::drop_extras(&mut cloud, |e| e.name == "uncertainty");
+    rows::drop_extras(&mut cloud, |e| e.name == UNCERTAINTY);
     let run = folder::run_of(splat);
     let here = files::folder_of(splat);
     let found = folder::highest(&[run.as_path(), here], |n| number_in(n, "index_decoder_chkpnt", ".pth"));

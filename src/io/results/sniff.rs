@@ -52,7 +52,7 @@ const SPLAT: &str = "point_cloud.ply";
 /// Returns whether a property of a splat is one of a method's features.
 pub fn is_feature(property: &str) -> bool {
     let starts = [grouping::PREFIX, open_gaussian::PREFIX, feature_3dgs::PREFIX, legaussians::PREFIX];
-    starts.iter().any(|start| property.starts_with(start))
+    property == legaussians::UNCERTAINTY || starts.iter().any(|start| property.starts_with(start))
 }
 
 /// Returns whether a path may belong to a result: it is no scene of this program, and no photos.

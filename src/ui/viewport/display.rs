@@ -256,32 +256,34 @@ fn report(failure: &Failure) -> String {
     format!("{} {}", failure.message, failure.remedy)
 }
 
+/// A frame of 4 x 4 px from `eye`, with depth 2 except at its first pixel.
 #[cfg(test)]
-pub(super) mod tests {
+pub(super) fn frame_of(ticket: u64, eye: &Eye) -> ViewPicture {
+    let mut depth = vec![2.0; 16];
+    depth[0] = 0.0;
+    ViewPicture {
+        ticket,
+        full: true,
+        camera: eye.camera(4, 4),
+        rgb: vec![[9; 3]; 16],
+        texture: None,
+        median_depth: Some(depth),
+        depth_range: None,
+        psnr: None,
+        second: None,
+        secs: 0.1,
+        stages: Vec::new(),
+        paint_secs: 0.0,
+        drawn_by: "CPU".into(),
+        instead_of_gpu: Some("it was lost".into()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::frame_of as frame;
     use super::*;
     use crate::scene::Bounds;
-
-    /// A frame of 4 x 4 px from `eye`, with depth 2 except at its first pixel.
-    pub(in super::super) fn frame(ticket: u64, eye: &Eye) -> ViewPicture {
-        let mut depth = vec![2.0; 16];
-        depth[0] = 0.0;
-        ViewPicture {
-            ticket,
-            full: true,
-            camera: eye.camera(4, 4),
-            rgb: vec![[9; 3]; 16],
-            texture: None,
-            median_depth: Some(depth),
-            depth_range: None,
-            psnr: None,
-            second: None,
-            secs: 0.1,
-            stages: Vec::new(),
-            paint_secs: 0.0,
-            drawn_by: "CPU".into(),
-            instead_of_gpu: Some("it was lost".into()),
-        }
-    }
 
     fn failure() -> Failure {
         Failure::new("no", "wait")

@@ -159,8 +159,14 @@ fn a_click_while_a_job_runs_waits_for_depth_and_finds_its_surface() {
     w.until("a job", |a| a.state.job.is_some());
     w.press(Key::M);
     click_view(&mut w, hit);
-    depth(&mut w);
-    assert!(!disabled(&w) && !w.shows("No surface there"));
+    for _ in 0..3_000 {
+        if !disabled(&w) || w.shows("No surface there") {
+            break;
+        }
+        w.harness.step();
+        std::thread::sleep(std::time::Duration::from_millis(10));
+    }
+    assert!(!w.shows("No surface there") && !disabled(&w));
     w.ask(Action::Cancel);
     w.until("the end", |a| a.state.job.is_none());
 }

@@ -8,6 +8,7 @@ use egui::{Event, Modifiers, PointerButton, Pos2};
 use egui_kittest::kittest::Queryable;
 use rand::{RngExt, SeedableRng};
 
+use fmlgs::pipeline::semantics::lifting::edit::Edit;
 use fmlgs::scene::GaussianCloud;
 use fmlgs::ui::actions::Action;
 use fmlgs::ui::app::App;
@@ -131,4 +132,35 @@ fn photos_alone_have_nothing_to_clean() {
     w.until("the photos", |a| a.state.scene.is_some());
     w.ask(Action::MeasureSplats);
     assert!(w.app().state.log.iter().any(|line| line.text.contains("Only trained Gaussians can be cleaned")));
+}
+
+#[test]
+fn undo_beyond_the_first_copy_reaches_the_scene_that_it_was_made_of() {
+    let folder = tempfile::tempdir().expect("folder");
+    let mut w = window(folder.path());
+    let (scene, edited) = (folder.path().join("scene"), folder.path().join("scene-edited"));
+    let name = |a: &App| a.state.semantics.as_ref().map(|map| map.identities.name(1)).unwrap_or_default();
+    let stored_name = || {
+        let mut w = Window::new(Some(Action::Open(scene.clone())));
+        w.until("its objects", |a| a.state.semantics.is_some());
+        name(w.app())
+    };
+    let before = name(w.app());
+    w.ask(Action::Change(Edit::Rename(1, "crate".into())));
+    w.until("the name", |a| name(a) == "crate");
+    w.ask(Action::Transform(2));
+    w.harness.run_steps(4);
+    tick(&mut w, "Color");
+    tick(&mut w, "Apply to a copy");
+    w.ask(Action::ApplyTransform);
+    w.until("the copy", |a| a.state.scene.as_ref().is_some_and(|s| s.out == edited));
+    w.ask(Action::Undo);
+    w.until("one box less", |a| a.viewport.cloud().is_some_and(|c| c.len() == stored(&scene)));
+    assert_eq!((stored_name().as_str(), name(w.app()).as_str()), ("crate", "crate"), "the control");
+    w.ask(Action::Undo);
+    w.until("the old name", |a| name(a) == before);
+    assert_eq!(stored_name(), before, "not only in the copy");
+    w.ask(Action::Redo);
+    w.until("the new name", |a| name(a) == "crate");
+    assert_eq!(stored_name(), "crate");
 }

@@ -315,7 +315,7 @@ fn meters_per_unit(state: &AppState) -> Option<f64> {
 mod tests {
     use std::sync::Arc;
 
-    use super::super::super::display::tests::frame;
+    use super::super::super::display::frame_of as frame;
     use super::*;
     use crate::scene::Bounds;
     use crate::worker::Slot;

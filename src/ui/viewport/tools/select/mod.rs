@@ -67,7 +67,6 @@ pub(crate) struct SelectTool {
     /// The job of the running step, and true if that is of a line.
     running: Option<Task<Selected>>,
     runs_line: bool,
-    /// True if the scene is prepared for clicks.
     is_prepared: bool,
     /// True if preparation has failed; the next stroke tries again.
     gave_up: bool,
@@ -78,7 +77,6 @@ pub(crate) struct SelectTool {
     preview: Option<Versioned<SemanticMap>>,
     marked: Option<Arc<SplatSelection>>,
     drawn: DrawnOutline,
-    /// Pose of the view of that outline.
     drawn_at: Option<Pose>,
 }
 
