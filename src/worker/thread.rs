@@ -233,8 +233,14 @@ fn run_one(
         alone: AtomicBool::new(false),
     };
     observer.send(Event::Started(job, info));
-    let is_canceled = observer.control.signal() == Signal::Cancel;
-    let end = if is_canceled { JobEnd::Cancelled } else { work(&mut observer) };
+    let end = match observer.control.signal() {
+        Signal::Cancel => {
+            // The task knows before the event that there is no result.
+            drop(work);
+            JobEnd::Cancelled
+        }
+        Signal::Pause | Signal::Continue => work(&mut observer),
+    };
     lock(controls).remove(&job);
     observer.send(Event::Ended(job, end));
 }

@@ -85,7 +85,7 @@ impl RunningJob {
         let before = before.and(self.left_secs).map(|left| (self.whole.secs() - secs, left));
         let with_later = |left: f64| Some(left + self.whole.later_secs(left)?);
         let is_of_stage = self.left_stage == progress.stage;
-        let now = progress.eta_secs().filter(|_| progress.done > 0).and_then(with_later);
+        let now = progress.eta_secs().filter(|_| progress.done > 0 || !is_planned).and_then(with_later);
         if now.is_some() {
             self.left_stage.clone_from(&progress.stage);
         }

@@ -123,55 +123,6 @@ fn points_are_put_taken_back_and_left() {
 }
 
 #[test]
-fn a_click_while_a_job_runs_waits_for_depth_and_finds_its_surface() {
-    let folder = tempfile::tempdir().expect("folder");
-    let mut w = window(folder.path());
-    let disabled = |w: &Window| w.harness.get_by_label("Undo point").accesskit_node().is_disabled();
-    let depth = |w: &mut Window| {
-        for _ in 0..3_000 {
-            if !w.shows("Waiting for the depth") {
-                return;
-            }
-            w.harness.step();
-            std::thread::sleep(std::time::Duration::from_millis(10));
-        }
-        panic!("the depth has not come");
-    };
-    w.press(Key::M);
-    let places = (-4..=4).flat_map(|x| (-3..=2).map(move |y| [0.08 * x as f32, 0.08 * y as f32]));
-    let mut is_hit = |share: &[f32; 2]| {
-        click_view(&mut w, *share);
-        depth(&mut w);
-        !disabled(&w)
-    };
-    let all: Vec<[f32; 2]> = places.collect();
-    let hit = *all.iter().find(|share| is_hit(share)).expect("a surface");
-    let missed = all.iter().any(|share| {
-        click_view(&mut w, *share);
-        depth(&mut w);
-        w.shows("No surface there")
-    });
-    assert!(missed, "control: beside the boxes there is none");
-    w.press(Key::Escape);
-    let layout = &mut w.harness.state_mut().layout;
-    (layout.finding.max_seeds, layout.finding.encoder) = (1, Some("none".into()));
-    w.ask(Action::FindObjects);
-    w.until("a job", |a| a.state.job.is_some());
-    w.press(Key::M);
-    click_view(&mut w, hit);
-    for _ in 0..3_000 {
-        if !disabled(&w) || w.shows("No surface there") {
-            break;
-        }
-        w.harness.step();
-        std::thread::sleep(std::time::Duration::from_millis(10));
-    }
-    assert!(!w.shows("No surface there") && !disabled(&w));
-    w.ask(Action::Cancel);
-    w.until("the end", |a| a.state.job.is_none());
-}
-
-#[test]
 fn the_camera_path_stays_with_its_scene_and_a_damaged_one_is_left_alone() {
     let folder = tempfile::tempdir().expect("folder");
     let mut w = window(folder.path());
