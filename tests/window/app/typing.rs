@@ -196,7 +196,7 @@ fn while_a_question_is_open_no_letter_acts_and_no_sentence_answers_it() {
     let enter = vec![key(Key::Enter, true, Modifiers::NONE), key(Key::Enter, false, Modifiers::NONE)];
     at_once(&mut w, [slash(), letters("what is bigger than the top"), enter.clone(), letters("one two")]);
     assert!(w.shows("Keep running"), "its spaces and Enter press nothing");
-    w.types("/both of two ");
+    w.types("/both of two");
     at_once(&mut w, [enter.clone()]);
     assert!(w.shows("Keep running"), "letter by letter");
     assert!(!w.shows("Fit scene") && !w.app().viewport.is_orthographic() && center(&w) == home);
