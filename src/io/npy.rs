@@ -84,7 +84,7 @@ fn syntax(path: &Path, reason: String) -> IoError {
 }
 
 /// Returns the number of bytes before the data of an `.npy` file.
-fn header_len(bytes: &[u8]) -> Option<usize> {
+pub(super) fn header_len(bytes: &[u8]) -> Option<usize> {
     let [0x93, b'N', b'U', b'M', b'P', b'Y', major, _, rest @ ..] = bytes else { return None };
     let (start, length) = match major {
         1 => (10, usize::from(u16::from_le_bytes(*rest.first_chunk()?))),

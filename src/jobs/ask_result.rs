@@ -14,14 +14,10 @@ use crate::models::{self, ModelError, TextSource};
 use crate::pipeline::semantics::query::foreign::asked::ForeignScene;
 use crate::pipeline::semantics::query::foreign::own_rules::ForeignMask;
 use crate::pipeline::semantics::query::foreign::{ForeignError, ForeignPhrase};
+use crate::pipeline::semantics::query::recipe::{LERFS_PHRASES, TEMPERATURE};
 use crate::pipeline::semantics::query::timing::ms_since;
 use crate::render::Renderer;
 use crate::scene::Camera;
-
-/// Phrases that mean anything, by LERF; all methods compare with them.
-const CANONICAL: [&str; 4] = ["object", "things", "stuff", "texture"];
-/// Factor of the advantage before it becomes relevancy, by LERF.
-const TEMPERATURE: f32 = 10.0;
 
 /// Opens the result that a scene was read from, as it is asked.
 ///
@@ -65,7 +61,7 @@ pub(crate) fn vectors<S: TextSource<Error = ModelError> + ?Sized>(
         return Err(JobError::EmptyQuery);
     }
     let start = Instant::now();
-    let phrases: Vec<&str> = std::iter::once(text).chain(CANONICAL).collect();
+    let phrases: Vec<&str> = std::iter::once(text).chain(LERFS_PHRASES).collect();
     let mut all = source.texts(&phrases).into_iter().collect::<Result<Vec<_>, _>>()?;
     let canonical = all.split_off(1.min(all.len()));
     let query = all.pop().ok_or(JobError::EmptyQuery)?;
@@ -226,7 +222,7 @@ mod tests {
     fn given() -> PhraseVectors {
         let all: Vec<Vec<f32>> = expected("scene/texts.npy").chunks_exact(512).map(<[f32]>::to_vec).collect();
         let mut source = |phrase: &str| -> Result<Vec<f32>, ModelError> {
-            let at = CANONICAL.iter().position(|c| *c == phrase).map_or(0, |c| c + 1);
+            let at = LERFS_PHRASES.iter().position(|c| *c == phrase).map_or(0, |c| c + 1);
             Ok(all[at].clone())
         };
         vectors(&mut source, " the kettle ").expect("encoded")

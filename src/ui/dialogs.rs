@@ -21,6 +21,13 @@ pub(crate) struct Question {
     pub(crate) deletes: bool,
 }
 
+impl Question {
+    /// A question before something is deleted for good.
+    pub(crate) fn deletion(text: String) -> Self {
+        Self { text, yes: "Delete", other: None, no: "Cancel", deletes: true }
+    }
+}
+
 /// Answer to a [`Question`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum DialogAnswer {

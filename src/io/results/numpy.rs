@@ -7,10 +7,9 @@ use half::f16;
 use zip::ZipArchive;
 
 use super::rows::FeatureRows;
+use crate::io::npy::header_len;
 use crate::io::{IoError, files, memory};
 
-/// Longest header in bytes; that of an array of numbers takes 128.
-const MAX_HEADER_BYTES: usize = 1024;
 /// Most arrays of an archive.
 const MAX_ENTRIES: usize = 256;
 /// Kinds of numbers, with their bytes.
@@ -59,16 +58,6 @@ pub(in crate::io) fn parse(mut bytes: Vec<u8>) -> Result<NumpyArray, String> {
     }
     bytes.drain(..header);
     Ok(NumpyArray { shape, kind: kind.to_owned(), bytes })
-}
-
-/// Returns the number of bytes before the numbers.
-fn header_len(bytes: &[u8]) -> Option<usize> {
-    let [0x93, b'N', b'U', b'M', b'P', b'Y', major, _, rest @ ..] = bytes else { return None };
-    let (start, length) = match major {
-        1 => (10, usize::from(u16::from_le_bytes(*rest.first_chunk()?))),
-        _ => (12, u32::from_le_bytes(*rest.first_chunk()?) as usize),
-    };
-    (length <= MAX_HEADER_BYTES && start + length <= bytes.len()).then_some(start + length)
 }
 
 impl NumpyArray {

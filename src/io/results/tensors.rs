@@ -4,8 +4,8 @@ use std::path::Path;
 
 use super::decoder::LinearLayer;
 use super::rows::FeatureRows;
-use crate::io::IoError;
 use crate::io::torch::WeightFile;
+use crate::io::{IoError, trainings};
 use crate::scene::GaussianCloud;
 
 /// Rows that are read at once.
@@ -98,39 +98,8 @@ impl<'a> Tensors<'a> {
         IoError::syntax(self.path, format!("tensor '{name}'"), problem)
     }
 
-    /// Gaussians of the tuple that 3D Gaussian Splatting's `capture()` makes: values 1 to 6 of value 0.
+    /// Gaussians of the tuple that 3D Gaussian Splatting's `capture()` makes.
     pub(super) fn cloud(&mut self) -> Result<GaussianCloud, IoError> {
-        fn fixed<const N: usize>(values: &[f32]) -> Vec<[f32; N]> {
-            values.as_chunks().0.to_vec()
-        }
-        let positions = fixed::<3>(&self.floats("0.1")?);
-        let n = positions.len();
-        let rest = self.shape("0.3").and_then(|s| s.get(1).copied()).unwrap_or(0);
-        let degree = (0..=3_u8).find(|d| crate::math::sh::coefficients(*d) == rest + 1);
-        let sh_degree =
-            degree.ok_or_else(|| self.error("0.3", format!("has {rest} harmonics, expected 0, 3, 8 or 15")))?;
-        let expected = [("0.1", 3), ("0.2", 3), ("0.3", 3 * rest), ("0.4", 3), ("0.5", 4), ("0.6", 1)];
-        for (name, each) in expected {
-            let have: usize = self.shape(name).map_or(0, |s| s.iter().product());
-            if have != n * each {
-                return Err(self.error(name, format!("has {have} numbers, expected {each} for each of {n} Gaussians")));
-            }
-        }
-        let constant = fixed::<3>(&self.floats("0.2")?);
-        let higher = if rest == 0 { Vec::new() } else { fixed::<3>(&self.floats("0.3")?) };
-        let sh =
-            (0..n).flat_map(|i| std::iter::once(constant[i]).chain(higher[i * rest..(i + 1) * rest].iter().copied()));
-        let sh = sh.collect();
-        let cloud = GaussianCloud {
-            positions,
-            log_scales: fixed(&self.floats("0.4")?),
-            quaternions: fixed(&self.floats("0.5")?),
-            opacity_logits: self.floats("0.6")?,
-            sh_degree,
-            sh,
-            ..GaussianCloud::default()
-        };
-        cloud.validate().map_err(|cause| IoError::Cloud { path: self.path.into(), cause })?;
-        Ok(cloud)
+        trainings::gaussians(self.path, &mut self.file)
     }
 }

@@ -9,6 +9,7 @@ use super::parameters::{self, ColorMeaning, TensorNames};
 use crate::io::gs_output::{self, GsOutput};
 use crate::io::torch::WeightFile;
 use crate::io::{IoError, files};
+use crate::scene::GaussianCloud;
 
 /// Number of values in the tuple of a plain training.
 pub(super) const LEAST: usize = 12;
@@ -31,6 +32,21 @@ pub(super) fn open(path: &Path) -> Result<Training, IoError> {
         });
     }
     let mut file = WeightFile::open(path).map_err(|e| e.of(path))?;
+    let mut cloud = gaussians(path, &mut file)?;
+    // Bands that the training had not turned on yet are zero, and stay so.
+    if file.tree.length("0") != Some(LEAST) {
+        cloud.warnings.push(super::MORE_VALUES.into());
+    }
+    let mut beside = beside.unwrap_or_else(|| GsOutput::of(files::folder_of(path)));
+    beside.name = Some(files::folder_name(&beside.folder));
+    Ok(Training { cloud, beside })
+}
+
+/// Reads the Gaussians of the tuple that `capture()` of 3D Gaussian Splatting and its descendants makes.
+///
+/// # Errors
+/// If a tensor is missing, broken, or of another shape.
+pub(crate) fn gaussians(path: &Path, file: &mut WeightFile) -> Result<GaussianCloud, IoError> {
     let name = |index: usize| format!("0.{index}");
     let names = TensorNames {
         means: name(1),
@@ -40,12 +56,5 @@ pub(super) fn open(path: &Path) -> Result<Training, IoError> {
         quats: name(5),
         opacities: name(6),
     };
-    let mut cloud = parameters::read(path, &mut file, &names, ColorMeaning::Harmonics)?;
-    // Bands that the training had not turned on yet are zero, and stay so.
-    if file.tree.length("0") != Some(LEAST) {
-        cloud.warnings.push(super::MORE_VALUES.into());
-    }
-    let mut beside = beside.unwrap_or_else(|| GsOutput::of(files::folder_of(path)));
-    beside.name = Some(files::folder_name(&beside.folder));
-    Ok(Training { cloud, beside })
+    parameters::read(path, file, &names, ColorMeaning::Harmonics)
 }

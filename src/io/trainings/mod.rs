@@ -23,6 +23,8 @@ use crate::scene::GaussianCloud;
 
 use kind::{CheckpointKind, kind_of};
 
+pub(crate) use self::inria::gaussians;
+
 /// Gaussians of another program's training, and the cameras and photos that belong to them.
 #[derive(Debug)]
 pub(crate) struct Training {

@@ -13,13 +13,11 @@ use crate::pipeline::semantics::evaluation::langsplat;
 use crate::pipeline::semantics::query::foreign::asked::{ForeignScene, ForeignView};
 use crate::pipeline::semantics::query::foreign::own_rules::ForeignMask;
 use crate::pipeline::semantics::query::foreign::{ForeignError, ForeignPhrase};
-use crate::pipeline::semantics::query::recipe::QueryConfig;
+use crate::pipeline::semantics::query::recipe::{QueryConfig, TEMPERATURE};
 use crate::pipeline::semantics::smoothing::{largest_level, peak};
 use crate::render::{RenderSettings, Renderer};
 use crate::scene::{Camera, GaussianCloud, LevelFilter, SemanticMap};
 
-/// Temperature of all methods, unless their own rule says otherwise.
-const TEMPERATURE: f32 = 10.0;
 /// Own rule of this program in words.
 const BY_IDENTITY: &str = "pixels of the object or part that is the answer";
 

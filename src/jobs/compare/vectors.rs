@@ -7,13 +7,11 @@ use std::time::Instant;
 use crate::jobs::JobError;
 use crate::math::stats::median;
 use crate::models::{self, Encoder};
+use crate::pipeline::semantics::query::recipe::LERFS_PHRASES;
 use crate::pipeline::semantics::query::timing::ms_since;
 
 /// Function from an encoder's name and phrases to their vectors.
 pub(crate) type TextFunction<'a> = &'a mut dyn FnMut(&str, &[&str]) -> Result<Vec<Vec<f32>>, JobError>;
-
-/// Canonical phrases of all these methods, which are LERF's.
-const CANONICAL: [&str; 4] = ["object", "things", "stuff", "texture"];
 
 /// Vectors of phrases, and the time that each took.
 pub(crate) struct KnownVectors<'a> {
@@ -55,7 +53,7 @@ impl<'a> KnownVectors<'a> {
     /// # Errors
     /// As [`Self::get`].
     pub(crate) fn canonical(&mut self, encoder: &str) -> Result<Vec<Vec<f32>>, JobError> {
-        CANONICAL.iter().map(|phrase| Ok(self.get(encoder, phrase)?.0)).collect()
+        LERFS_PHRASES.iter().map(|phrase| Ok(self.get(encoder, phrase)?.0)).collect()
     }
 }
 

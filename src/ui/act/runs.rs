@@ -48,7 +48,7 @@ pub(in crate::ui) fn ask_to_delete(app: &mut App, run: PathBuf) {
          undone.\n\n{}",
         run.display()
     );
-    let question = Question { text, yes: "Delete", other: None, no: "Cancel", deletes: true };
+    let question = Question::deletion(text);
     app.put_question(question, |app, answer| {
         if answer == DialogAnswer::Yes {
             delete(app, run);
@@ -74,7 +74,7 @@ pub(super) fn ask_to_delete_open(app: &mut App) {
         "Delete the scene {name}? Its Gaussians and objects are deleted with its folder. This cannot be undone.\n\n{}",
         folder.display()
     );
-    let question = Question { text, yes: "Delete", other: None, no: "Cancel", deletes: true };
+    let question = Question::deletion(text);
     app.put_question(question, |app, answer| {
         if answer == DialogAnswer::Yes {
             delete(app, folder);

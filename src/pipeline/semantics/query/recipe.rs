@@ -13,10 +13,10 @@ use crate::scene::{Lifting, MaskGrid, MaskPrompt, Preparation, SemanticMap};
 
 /// Canonical phrases of the paper, which fit anything.
 pub const PAPERS_PHRASES: [&str; 3] = ["object", "stuff", "texture"];
-/// Canonical phrases of LERF.
-const LERFS_PHRASES: [&str; 4] = ["object", "things", "stuff", "texture"];
+/// Canonical phrases of LERF, and of the methods that follow it.
+pub(crate) const LERFS_PHRASES: [&str; 4] = ["object", "things", "stuff", "texture"];
 /// Temperature that spreads scores over the unit interval, as in LERF.
-const TEMPERATURE: f32 = 10.0;
+pub(crate) const TEMPERATURE: f32 = 10.0;
 
 /// Source of the scores of a query.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]

@@ -283,7 +283,7 @@ pub(in crate::ui) fn ask_to_delete_removed(app: &mut App) {
     let text = format!(
         "Delete the copy without \u{201c}{name}\u{201d}? The original stays. This cannot be undone.\n\n{folder}"
     );
-    let question = Question { text, yes: "Delete", other: None, no: "Cancel", deletes: true };
+    let question = Question::deletion(text);
     app.put_question(question, |app, answer| {
         if answer == DialogAnswer::Yes {
             delete_removed(app);

@@ -36,6 +36,13 @@ pub struct ForeignMask {
     pub rule: &'static str,
 }
 
+impl ForeignMask {
+    fn of_level(found: Option<LeveledMask>, rule: &'static str) -> Result<Self, ForeignError> {
+        let LeveledMask { mask, level, values, peak } = found.ok_or(ForeignError::Level(0))?;
+        Ok(Self { mask, level, values, peak, rule })
+    }
+}
+
 impl ForeignScene {
     /// The mask by the method's own rule.
     pub fn own_mask(
@@ -53,13 +60,9 @@ impl ForeignScene {
         let covered = |(mask, values), level, rule| ForeignMask { mask, level, values, peak: None, rule };
         match method {
             Method::LangSplat | Method::LangSplatV2 | Method::OccamsLgs => {
-                let mut levels = Vec::with_capacity(self.result.levels.len());
-                for level in 0..self.result.levels.len() {
-                    levels.push(self.relevancy_of_method(renderer, view, level, phrase)?);
-                }
-                let found = by_smoothing(&levels, w, h).ok_or(ForeignError::Level(0))?;
-                let LeveledMask { mask, level, values, peak } = found;
-                Ok(ForeignMask { mask, level, values, peak, rule: BY_SMOOTHING })
+                let each = |level| self.relevancy_of_method(renderer, view, level, phrase);
+                let levels = self.of_levels(each)?;
+                ForeignMask::of_level(by_smoothing(&levels, w, h), BY_SMOOTHING)
             }
             Method::LeGaussians => {
                 let phrase = ForeignPhrase { temperature: LEGAUSSIANS_TEMPERATURE, ..phrase };
@@ -104,13 +107,16 @@ impl ForeignScene {
         phrase: ForeignPhrase<'_>,
     ) -> Result<ForeignMask, ForeignError> {
         let (w, h) = view.size();
-        let mut levels = Vec::with_capacity(self.result.levels.len());
-        for level in 0..self.result.levels.len() {
-            levels.push(self.pixel_relevancy(renderer, view, level, phrase)?);
-        }
-        let found = by_common_rule(&levels, w, h).ok_or(ForeignError::Level(0))?;
-        let LeveledMask { mask, level, values, peak } = found;
-        Ok(ForeignMask { mask, level, values, peak, rule: BY_COMMON_RULE })
+        let levels = self.of_levels(|level| self.pixel_relevancy(renderer, view, level, phrase))?;
+        ForeignMask::of_level(by_common_rule(&levels, w, h), BY_COMMON_RULE)
+    }
+
+    /// Relevancies of all levels, in order.
+    fn of_levels(
+        &self,
+        each: impl FnMut(usize) -> Result<Vec<f32>, ForeignError>,
+    ) -> Result<Vec<Vec<f32>>, ForeignError> {
+        (0..self.result.levels.len()).map(each).collect()
     }
 
     /// Pixels whose blended membership in the best segments of these levels is over a half.
