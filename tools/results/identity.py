@@ -159,7 +159,7 @@ def laga(root, scene):
     """LaGa: SAGA's features, and descriptors of clusters of three levels: 2 a cluster (official: 20)."""
     s = Sample(root, "laga", scene)
     r = torch_files.seeded(25)
-    each, counts = 2, (4, 2, 2)
+    each, counts = 2, (4, 4, 2)
     affinity = unit(np.eye(4, 32)[scene.cluster] + r.normal(0, 0.1, (len(scene.xyz), 32))).astype(np.float32)
     s.model_folder()
     s.ply("point_cloud", "iteration_30000", "scene_point_cloud.ply")
@@ -174,7 +174,8 @@ def laga(root, scene):
         rows = unit(rows + r.normal(0, 0.5 / DIMENSION**0.5, rows.shape)) * r.uniform(0.8, 1, (len(rows), 1))
         features.append(rows.astype(np.float32))
         weight = r.uniform(0.5, 1, count * each)
-        weight[each - 1 :: each] = 0
+        # Some clusters have fewer.
+        weight[each - 1 :: 2 * each] = 0
         weights.append(weight.astype(np.float32))
         score = r.uniform(0, 0.5, (len(scene.xyz), count))
         score[np.arange(len(score)), scene.cluster % count] += 1
@@ -186,15 +187,25 @@ def laga(root, scene):
         torch_files.save([torch.from_numpy(v) for v in values], s.path(*where, f"{name}.pth"))
     relevancies, positives = [], []
     for level, count in enumerate(counts):
+        s.expect(f"features_first_rows_{level + 1}", features[level][:2])
+        s.expect(f"weights_{level + 1}", weights[level])
+        s.expect(f"clusters_{level + 1}", scores[level].argmax(1))
         value = (relevancy(features[level], scene.texts) * weights[level]).reshape(count, each)
         best = value.argmax(1)
         cosine = cosines(features[level], scene.texts)[:, 0].reshape(count, each)[np.arange(count), best]
         cluster = scores[level].argmax(1)
         relevancies.append(value.max(1)[cluster])
         positives.append(cosine[cluster])
-    s.expect("relevancy_gaussians", np.mean(relevancies, axis=0))
-    s.expect("cosine_gaussians", np.max(positives, axis=0))
-    s.expect("affinity", affinity)
+        s.expect(f"relevancy_gaussians_{level + 1}", relevancies[-1])
+    whole, nearest = np.mean(relevancies, axis=0), np.max(positives, axis=0)
+    s.expect("relevancy_gaussians", whole)
+    s.expect("cosine_gaussians", nearest)
+    # As LaGa chooses Gaussians, without its filter over neighbors of like color.
+    normal = np.clip(whole, np.quantile(whole, 0.25), None)
+    normal = (normal - normal.min()) / (normal.max() - normal.min())
+    chosen = (normal >= 0.6) & (nearest >= 0.23)
+    s.expect("chosen_gaussians", chosen)
+    s.expect("membership_pixels", s.blended(chosen[:, None])[..., 0])
 
 
 ALL = [gaussian_grouping, saga, opengaussian, thgs, laga]

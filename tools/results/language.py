@@ -215,7 +215,8 @@ def legaussians(root, scene):
 
 
 def gags(root, scene):
-    """GAGS: `semantic_0..15` and a residual decoder (official: 256 hidden numbers)."""
+    """GAGS: `semantic_0..15` and a residual decoder (official: 256 hidden numbers). The last layer is such that each
+    cluster's code is decoded to about its feature."""
     s = Sample(root, "gags", scene)
     r = torch_files.seeded(15)
     hidden = 10
@@ -225,17 +226,40 @@ def gags(root, scene):
         for a, b in zip(widths, widths[1:])
     ]
     codes = (np.eye(4, 16)[scene.cluster] + r.normal(0, 0.2, (len(scene.xyz), 16))).astype(np.float32)
+
+    def hide(x):
+        x = kept = np.asarray(x, np.float64)
+        for i, (weight, bias) in enumerate(layers[:-1]):
+            # Skips the second and the third of three layers.
+            kept = x if i in (1, 4) else kept
+            x = np.maximum(x @ weight.T.astype(np.float64) + bias, 0)
+            x = x + kept if i in (2, 5) else x
+        return x
+
+    shown = np.concatenate([hide(np.eye(4, 16)), np.ones((4, 1))], axis=1)
+    last = np.linalg.lstsq(shown, scene.cluster_features, rcond=1e-3)[0].T.astype(np.float32)
+    layers[-1] = (last[:, :-1], last[:, -1])
+
+    def decode(x):
+        weight, bias = layers[-1]
+        return unit(hide(x) @ weight.T.astype(np.float64) + bias)
+
     s.model_folder()
     s.ply(
         "point_cloud", "iteration_30000", "point_cloud.ply", after=[([f"semantic_{i}" for i in range(16)], codes)]
     )
     state = {}
     for i, (weight, bias) in enumerate(layers):
+        weight, bias = np.ascontiguousarray(weight), np.ascontiguousarray(bias)
         state[f"decoder.{2 * i}.weight"] = torch.from_numpy(weight)[:, :, None, None]
         state[f"decoder.{2 * i}.bias"] = torch.from_numpy(bias)
     torch_files.save({"module_state_dict": state}, s.path("decoder_chkpnt30000.pth"))
+    rendered = s.blended(codes)
+    seen = s.weights().sum(-1, keepdims=True) > 0
     s.expect("codes", codes)
-    s.expect("codes_pixels", s.blended(codes))
+    s.expect("codes_pixels", rendered)
+    s.expect("decoded_first_rows", decode(codes[:4]))
+    _relevancies(s, "", decode(codes), np.where(seen, decode(rendered), 0), scene.texts)
 
 
 def dr_splat(root, scene):
@@ -321,6 +345,7 @@ def semantic_gaussians(root, scene):
     s.expect("features_first_rows", features[:2])
     s.expect("cosines_gaussians", cosines(whole, scene.texts))
     s.expect("cosines_pixels", cosines(s.blended(whole), scene.texts))
+    _relevancies(s, "", whole, s.blended(whole), scene.texts)
 
 
 ALL = [
