@@ -16,9 +16,9 @@ const ROWS: usize = 60;
 
 /// Ask results of several methods the same phrases, side by side
 ///
-/// Takes scenes of this program with objects, and results of LangSplat, LangSplatV2, OpenGaussian, Feature 3DGS,
-/// LEGaussians, Occam's LGS, Dr.Splat, THGS, LUDVIG and others. Each phrase is asked in each view: relevancy, the mask
-/// by the method's own rule and by a rule that is the same for all, IoU and localization where labels are given, and
+/// Takes scenes of this program with objects, and results of LangSplat, LangSplatV2, OpenGaussian, LaGa, Feature 3DGS,
+/// GAGS, LEGaussians, Occam's LGS, Dr.Splat, THGS, LUDVIG and others. Each phrase is asked in each view: relevancy, the
+/// mask by the method's own rule and by a rule that is the same for all, IoU and localization where labels are given, and
 /// times. Writes compare.json, compare.csv, a picture sheet compare.png and a page compare.html.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  \

@@ -54,8 +54,11 @@ impl CliError {
             JobError::NothingHeldOut(_) => "; --held-out-every 0 compares with all photos".into(),
             JobError::NoObjects(path) => format!("; find them with 'fmlgs preprocess {}'", path.display()),
             JobError::NotGrouped { path, method } => match method.kind() {
-                MethodKind::Embeddings => {
+                MethodKind::Embeddings if method.encoder().is_some() => {
                     format!("; its embeddings answer phrases: 'fmlgs query {} PHRASE'", path.display())
+                }
+                MethodKind::Embeddings => {
+                    format!("; 'fmlgs import {} --out SCENE' and 'fmlgs preprocess SCENE' find some", path.display())
                 }
                 _ => format!("; 'fmlgs import {} --out SCENE' makes some", path.display()),
             },

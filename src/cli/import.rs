@@ -11,10 +11,10 @@ use crate::math::format::things;
 /// Make a scene of what another program trained
 ///
 /// Keeps the Gaussians, the cameras and the photos' place, and what a method found: classes of Gaussian Grouping and
-/// Gaga, clusters of OpenGaussian, objects and parts of THGS, and objects that HDBSCAN finds among the features of
-/// SAGA and OmniSeg3D-GS, besides SAGA's saved selections with their names. The scene can be asked, edited and exported like any other, and 'fmlgs preprocess' finds
-/// objects in one without. Embeddings of single Gaussians are not kept: 'fmlgs query' asks the result itself. The
-/// result stays as it is.
+/// Gaga, clusters of OpenGaussian, objects and parts of THGS and LaGa, and objects that HDBSCAN finds among the features
+/// of SAGA and OmniSeg3D-GS, besides SAGA's saved selections with their names. The scene can be asked, edited and
+/// exported like any other, and 'fmlgs preprocess' finds objects in one without. Embeddings of single Gaussians are not
+/// kept: 'fmlgs query' asks the result itself. The result stays as it is.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  \
     fmlgs import gaussian-grouping/output/kitchen --out kitchen/\n  \

@@ -47,7 +47,7 @@ pub(crate) struct PhraseVectors {
 /// # Errors
 /// If the method knows no language, or its encoder is not on this machine.
 pub(crate) fn encoded(method: Method, text: &str) -> Result<PhraseVectors, JobError> {
-    let name = method.encoder().ok_or(ForeignError::NoLanguage(method.name()))?;
+    let name = method.encoder().ok_or_else(|| ForeignError::of_silent(method))?;
     vectors(&mut *models::encoder(name)?, text)
 }
 
@@ -181,6 +181,9 @@ pub(crate) fn facts(scene: &Scene) -> Option<ResultFacts> {
             ("phrases, clicks, and the names that you give", "phrases with relations, until its objects have names")
         }
         MethodKind::Affinities => ("nothing before 'fmlgs import' has found its objects", "phrases"),
+        MethodKind::Embeddings if method.encoder().is_none() => {
+            ("nothing: the text encoder of its embeddings is not in the list of models", "phrases, clicks and names")
+        }
         MethodKind::Embeddings => ("phrases ('fmlgs query')", "clicks and names: it has no objects"),
     };
     Some(ResultFacts { method: method.name(), levels, encoder: method.encoder(), answers, refuses, problem })
@@ -203,7 +206,11 @@ fn in_words(values: &LevelValues) -> String {
             format!("features of {} numbers, {} classes", features.dim(), classifier.bias.len())
         }
         LevelValues::Clusters(clusters) => {
-            format!("{} clusters, embeddings of {} numbers", clusters.features.len(), clusters.features.dim())
+            let (count, dim) = (clusters.count(), clusters.features.dim());
+            match &clusters.several {
+                None => format!("{count} clusters, embeddings of {dim} numbers"),
+                Some(several) => format!("{count} clusters, {} embeddings each of {dim} numbers", several.each),
+            }
         }
         LevelValues::Affinity { features, gate } => {
             let with = if gate.is_some() { ", weighed by a scale" } else { "" };
@@ -254,6 +261,11 @@ mod tests {
     #[test]
     fn methods_without_language_and_wrong_vectors_are_refused() {
         assert!(matches!(encoded(Method::Saga, "kettle"), Err(JobError::Foreign(ForeignError::NoLanguage("SAGA")))));
+        let silent = encoded(Method::SemanticGaussiansOpenSeg, "kettle").expect_err("no encoder").to_string();
+        assert!(
+            silent.contains("Semantic Gaussians") && silent.contains("ViT-L/14") && silent.contains("LSeg"),
+            "{silent}"
+        );
         let mut source = |_: &str| -> Result<Vec<f32>, ModelError> { Ok(vec![1.0, 0.0]) };
         assert!(matches!(vectors(&mut source, "  "), Err(JobError::EmptyQuery)));
         let short = vectors(&mut source, "kettle").expect("two numbers");
@@ -274,6 +286,10 @@ mod tests {
             (grouping.levels, grouping.encoder),
             (vec!["classes: features of 16 numbers, 256 classes".into()], None)
         );
+        let laga = of("laga").expect("a result");
+        assert_eq!(laga.levels[2], "large: 2 clusters, 2 embeddings each of 512 numbers");
+        let gags = of("gags").expect("a result");
+        assert_eq!(gags.levels, ["features: codes of 16 numbers, embeddings of 512"]);
         assert_eq!(of("mip_splatting"), None, "the control");
     }
 }

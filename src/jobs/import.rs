@@ -100,8 +100,11 @@ fn of_method(
     if method.kind() == MethodKind::Embeddings {
         let mut cloud = (*scene.cloud).clone();
         cloud.extras.retain(|extra| !results::is_feature(&extra.name));
-        let left =
-            format!("its embeddings stay in {0}; they answer phrases there: fmlgs query {0} PHRASE", path.display());
+        let stay = format!("its embeddings stay in {}", path.display());
+        let left = match method.encoder() {
+            Some(_) => format!("{stay}; they answer phrases there: fmlgs query {} PHRASE", path.display()),
+            None => stay,
+        };
         return Ok(Kept { cloud: Arc::new(cloud), map: None, left_out: Some(left) });
     }
     let result = match &scene.result {
@@ -147,7 +150,7 @@ mod tests {
     #[test]
     fn classes_and_clusters_become_objects_of_a_stored_scene() {
         let folder = tempfile::tempdir().expect("folder");
-        for (sample, name) in [("gaussian_grouping", true), ("opengaussian", false), ("thgs", false)] {
+        for (sample, name) in [("gaussian_grouping", true), ("opengaussian", false), ("thgs", false), ("laga", false)] {
             let out = folder.path().join(sample);
             let done = import(sample, &out, None).expect(sample);
             assert_eq!((done.gaussians, done.cameras, done.left_out), (32, 2, None), "{sample}");
@@ -172,7 +175,7 @@ mod tests {
     #[test]
     fn embeddings_are_not_kept_and_the_report_says_so() {
         let folder = tempfile::tempdir().expect("folder");
-        for sample in ["langsplat/output", "legaussians/output", "occams_lgs"] {
+        for sample in ["langsplat/output", "legaussians/output", "occams_lgs", "gags", "semantic_gaussians"] {
             let out = folder.path().join(sample.replace('/', "-"));
             let done = import(sample, &out, None).expect(sample);
             assert_eq!((done.gaussians, done.objects), (32, 0), "{sample}");

@@ -112,6 +112,16 @@ fn what_a_result_cannot_do_is_said_with_what_can() {
     assert!(info.contains("result of LangSplat") && info.contains("small: codes of 3 numbers"), "{info}");
     assert!(info.contains("clip-vit-b16"), "{info}");
 
+    for (name, method, says) in [
+        ("gags", "GAGS", "codes of 16 numbers"),
+        ("laga", "LaGa", "2 embeddings each"),
+        ("semantic_gaussians", "Semantic Gaussians", "clip-vit-b32"),
+        ("splat_distiller", "splat-distiller", "embeddings of 512 numbers"),
+    ] {
+        let info = run(&["info", &sample(name)]).ok().stdout;
+        assert!(info.contains(&format!("result of {method}")) && info.contains(says), "{info}");
+    }
+
     let refused = run(&["query", &saga, "kettle"]).fails_with(1).stderr;
     assert!(refused.contains("SAGA") && refused.contains("fmlgs import"), "{refused}");
     let refused = run(&["query", &sample("gaussian_grouping"), "class 3", "--level", "1"]).fails_with(2).stderr;

@@ -43,8 +43,10 @@ pub(super) fn run(args: &QueryArgs, scene: &Scene, method: Method) -> Result<(),
     let text = args.text.as_deref().unwrap_or_default();
     let camera = view::choose(args.camera.as_deref(), scene)?.limited_to(args.max_side);
     render::check_room(camera.width_px, camera.height_px)?;
-    let vectors = ask_result::encoded(method, text)?;
     let asked = ask_result::open(scene, &args.result.options())?;
+    // A decoder that an option names can tell another method than the files alone.
+    let method = asked.result.method;
+    let vectors = ask_result::encoded(method, text)?;
     let level = args.level.as_deref().map(|wanted| ask_result::level_of(&asked.result, wanted)).transpose()?;
     let answer = ask_result::ask(&asked, &camera, &vectors, level)?;
     let empty = Mask::empty(camera.width_px as usize, camera.height_px as usize);

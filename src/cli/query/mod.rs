@@ -12,6 +12,7 @@ use super::recipe::RecipeArgs;
 use super::result_args::ResultArgs;
 use super::scene_args::open_scene;
 use super::{CliError, number, output, view};
+use crate::io::results::Method;
 use crate::jobs::query::{self, QueryRequest, QueryResult};
 use crate::jobs::{export, render};
 use crate::pipeline::semantics::query::answer::Basis;
@@ -93,7 +94,8 @@ pub(crate) fn run(args: QueryArgs, quiet: bool) -> Result<(), CliError> {
     for out in args.mask.iter().chain(&args.heat) {
         export::check(out, &query::MAP_ENDINGS, &scene.reads())?;
     }
-    if let Some(method) = scene.method.filter(|m| scene.folder.is_none() && m.encoder().is_some()) {
+    let has_embeddings = |m: &Method| m.encoder().is_some() || m.missing_encoder().is_some();
+    if let Some(method) = scene.method.filter(|m| scene.folder.is_none() && has_embeddings(m)) {
         return foreign::run(&args, &scene, method);
     }
     if args.level.is_some() || args.out.is_some() || args.result.is_given() {

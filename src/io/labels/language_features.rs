@@ -264,7 +264,7 @@ fn decoded(decoder: &Decoder, code: &[f32]) -> Vec<f32> {
             DecoderStep::Linear(layer) => values = linear(layer, &values),
             DecoderStep::Relu => values.iter_mut().for_each(|v| *v = v.max(0.0)),
             // The autoencoder has none of these.
-            DecoderStep::Unit | DecoderStep::Softmax => {}
+            DecoderStep::Unit | DecoderStep::Softmax | DecoderStep::Keep | DecoderStep::AddKept => {}
         }
     }
     let values = last.map_or(values.clone(), |layer| linear(layer, &values));

@@ -1,4 +1,5 @@
-//! Networks that other methods store to turn short codes into embeddings: linear layers with simple steps between.
+//! Networks that other methods store to turn short codes into embeddings: linear layers with simple steps between, and
+//! numbers that skip some of them.
 
 use std::path::Path;
 
@@ -18,6 +19,10 @@ pub enum DecoderStep {
     Unit,
     /// Shares that sum to one.
     Softmax,
+    /// Remembers the numbers for the next [`Self::AddKept`].
+    Keep,
+    /// Adds the numbers that were remembered last.
+    AddKept,
 }
 
 /// A linear layer.
@@ -89,14 +94,22 @@ pub struct Decoder {
 impl Decoder {
     /// Creates a decoder of codes of `inputs` numbers whose layers fit one another.
     pub(crate) fn new(inputs: usize, steps: Vec<DecoderStep>, path: &Path) -> Result<Self, IoError> {
-        let mut outputs = inputs;
+        let (mut outputs, mut kept) = (inputs, 0);
         for (k, step) in steps.iter().enumerate() {
-            let DecoderStep::Linear(layer) = step else { continue };
-            if layer.inputs != outputs {
-                let reason = format!("step {k} takes {} numbers, but gets {outputs}", layer.inputs);
+            let takes = match step {
+                DecoderStep::Linear(layer) => layer.inputs,
+                DecoderStep::AddKept => kept,
+                DecoderStep::Relu | DecoderStep::Unit | DecoderStep::Softmax | DecoderStep::Keep => outputs,
+            };
+            if takes != outputs {
+                let reason = format!("step {k} takes {takes} numbers, but gets {outputs}");
                 return Err(IoError::syntax(path, "decoder", reason));
             }
-            outputs = layer.outputs;
+            match step {
+                DecoderStep::Linear(layer) => outputs = layer.outputs,
+                DecoderStep::Keep => kept = outputs,
+                _ => {}
+            }
         }
         Ok(Self { inputs, outputs, steps })
     }
@@ -139,6 +152,14 @@ mod tests {
         assert_eq!((decoder.inputs(), decoder.outputs(), decoder.split().0.len()), (3, 5, 2));
         assert!(Decoder::new(3, two([4, 3], [4, 5]), path).is_err(), "turned");
         assert!(Decoder::new(4, two([4, 3], [5, 4]), path).is_err());
+        // Numbers that skip a layer.
+        let over = |last: [usize; 2]| {
+            let kept = [DecoderStep::Keep, DecoderStep::Linear(layer(last)), DecoderStep::AddKept];
+            Decoder::new(3, [vec![DecoderStep::Linear(layer([4, 3]))], kept.to_vec()].concat(), path)
+        };
+        assert!(over([4, 4]).is_ok_and(|d| d.outputs() == 4 && d.split().1.is_none()));
+        assert!(over([5, 4]).expect_err("another number").to_string().contains("step 3 takes 4"));
+        assert!(Decoder::new(3, vec![DecoderStep::AddKept], path).is_err(), "nothing was kept");
         for (shape, weights, biases) in [([2, 3], 5, 2), ([2, 3], 6, 3), ([0, 3], 0, 0), ([1 << 40, 3], 6, 2)] {
             assert!(LinearLayer::new(shape, vec![0.0; weights], Some(vec![0.0; biases]), path).is_err(), "{shape:?}");
         }

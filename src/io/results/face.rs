@@ -41,6 +41,14 @@ pub enum Method {
     SplatDistiller,
     /// LUDVIG.
     Ludvig,
+    /// GAGS.
+    Gags,
+    /// LaGa.
+    Laga,
+    /// Semantic Gaussians with features of LSeg, of 512 numbers.
+    SemanticGaussians,
+    /// Semantic Gaussians with features of OpenSeg, of 768 numbers.
+    SemanticGaussiansOpenSeg,
 }
 
 /// OpenCLIP's ViT-B/16 of `laion2b_s34b_b88k`, by its name in the list of models.
@@ -66,7 +74,7 @@ impl Method {
     pub fn kind(self) -> MethodKind {
         match self {
             Self::GaussianGrouping => MethodKind::Classes,
-            Self::OpenGaussian | Self::Thgs => MethodKind::Clusters,
+            Self::OpenGaussian | Self::Thgs | Self::Laga => MethodKind::Clusters,
             Self::OmniSeg3d | Self::Saga => MethodKind::Affinities,
             _ => MethodKind::Embeddings,
         }
@@ -88,16 +96,25 @@ impl Method {
             Self::Thgs => "THGS",
             Self::SplatDistiller => "splat-distiller",
             Self::Ludvig => "LUDVIG",
+            Self::Gags => "GAGS",
+            Self::Laga => "LaGa",
+            Self::SemanticGaussians | Self::SemanticGaussiansOpenSeg => "Semantic Gaussians",
         }
     }
 
-    /// Text encoder whose embeddings its values are compared with; `None` if it knows no language.
+    /// Text encoder whose embeddings its values are compared with; `None` if it knows no language, or its encoder is
+    /// not in the list of models.
     pub fn encoder(self) -> Option<&'static str> {
         match self {
-            Self::GaussianGrouping | Self::OmniSeg3d | Self::Saga => None,
-            Self::Feature3dgs => Some(CLIP_B32),
+            Self::GaussianGrouping | Self::OmniSeg3d | Self::Saga | Self::SemanticGaussiansOpenSeg => None,
+            Self::Feature3dgs | Self::SemanticGaussians => Some(CLIP_B32),
             _ => Some(OPEN_CLIP),
         }
+    }
+
+    /// Text encoder that its values need, if the list of models lacks it, in words.
+    pub fn missing_encoder(self) -> Option<&'static str> {
+        (self == Self::SemanticGaussiansOpenSeg).then_some("CLIP ViT-L/14 at 336 px of OpenAI")
     }
 }
 
@@ -220,10 +237,40 @@ pub struct Classifier {
 pub struct ClusterLevel {
     /// Group of each Gaussian; `None` for those in no group.
     pub of: Vec<Option<u32>>,
-    /// Embedding of each group; all zeros for those that have none.
+    /// Embedding of each group, or its several embeddings one after the other; all zeros for those that have none.
     pub features: FeatureRows,
+    /// Weights of the embeddings of groups that have several; `None` if each group has one.
+    pub several: Option<Descriptors>,
     /// Groups in which a method looks for more of what it found; OpenGaussian's leaves.
     pub leaves: Option<Leaves>,
+}
+
+/// LaGa's several embeddings of each group.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Descriptors {
+    /// Embeddings of each group.
+    pub each: usize,
+    /// Weight of each embedding; 0 for those that fill up a group.
+    pub weights: Vec<f32>,
+}
+
+impl ClusterLevel {
+    /// Number of groups.
+    pub fn count(&self) -> usize {
+        self.features.len() / self.each()
+    }
+
+    /// Embeddings of each group.
+    pub fn each(&self) -> usize {
+        self.several.as_ref().map_or(1, |several| several.each.max(1))
+    }
+
+    /// Embeddings of group `k`, by their rows, each with its weight.
+    pub fn weighted(&self, k: usize) -> impl Iterator<Item = (usize, f32)> {
+        let each = self.each();
+        let weight = |row: usize| self.several.as_ref().map_or(1.0, |several| several.weights[row]);
+        (k * each..(k + 1) * each).map(move |row| (row, weight(row)))
+    }
 }
 
 /// OpenGaussian's small clusters within its large ones.

@@ -60,7 +60,13 @@ pub(super) fn distilled(file: &Path) -> Result<MethodResult, IoError> {
     assembled(Method::SplatDistiller, &splat, cloud, features)
 }
 
-fn assembled(method: Method, splat: &Path, cloud: GaussianCloud, rows: FeatureRows) -> Result<MethodResult, IoError> {
+/// Makes the result of a splat with an embedding for each Gaussian.
+pub(super) fn assembled(
+    method: Method,
+    splat: &Path,
+    cloud: GaussianCloud,
+    rows: FeatureRows,
+) -> Result<MethodResult, IoError> {
     let decoder = Decoder::none(rows.dim());
     let level = EmbeddedLevel { codes: LevelCodes::Dense(rows), is_unit: false, decoder };
     MethodResult::of_one_cloud(method, splat, cloud, vec![("features".into(), LevelValues::Embedded(level))])

@@ -10,7 +10,9 @@ mod face;
 mod faiss;
 mod feature_3dgs;
 mod folder;
+mod gags;
 mod grouping;
+mod laga;
 mod langsplat;
 mod legaussians;
 mod level_runs;
@@ -21,18 +23,21 @@ mod open_gaussian;
 mod product;
 mod rows;
 mod saga;
+mod semantic_gaussians;
 mod sniff;
 mod sparse;
 mod tensors;
 mod thgs;
 
 #[cfg(test)]
+mod neighbor_tests;
+#[cfg(test)]
 pub(crate) mod tests;
 
 pub use decoder::{Decoder, DecoderStep, LinearLayer};
 pub use face::{
-    CLIP_B32, Classifier, ClusterLevel, EmbeddedLevel, Leaves, LevelCodes, LevelValues, Method, MethodKind,
-    MethodResult, OPEN_CLIP, ResultLevel, ScaleGate,
+    CLIP_B32, Classifier, ClusterLevel, Descriptors, EmbeddedLevel, Leaves, LevelCodes, LevelValues, Method,
+    MethodKind, MethodResult, OPEN_CLIP, ResultLevel, ScaleGate,
 };
 pub use folder::ResultOptions;
 pub use open::open_result;

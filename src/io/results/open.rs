@@ -5,7 +5,10 @@ use std::path::{Path, PathBuf};
 use super::face::MethodResult;
 use super::folder::{self, ResultOptions};
 use super::level_runs::LevelRuns;
-use super::{feature_3dgs, grouping, langsplat, legaussians, level_runs, lifted, open_gaussian, saga, thgs};
+use super::{
+    feature_3dgs, gags, grouping, laga, langsplat, legaussians, level_runs, lifted, open_gaussian, saga,
+    semantic_gaussians, thgs,
+};
 use crate::io::ply::Ply;
 use crate::io::{IoError, files};
 
@@ -19,6 +22,8 @@ pub(super) enum ResultPlace {
     Thgs(PathBuf),
     /// SAGA's features.
     Saga(PathBuf),
+    /// LaGa's features, with clusters beside them.
+    Laga(PathBuf),
     /// A splat with the features of a method as properties.
     Splat(PathBuf, SplatFeatures),
     /// Checkpoints of levels.
@@ -27,6 +32,8 @@ pub(super) enum ResultPlace {
     Ludvig(PathBuf),
     /// splat-distiller's features.
     Distilled(PathBuf),
+    /// Features of Semantic Gaussians.
+    Fused(PathBuf),
 }
 
 /// Features in the properties of a splat.
@@ -34,6 +41,7 @@ pub(super) enum ResultPlace {
 pub(super) enum SplatFeatures {
     Grouping,
     OpenGaussian,
+    /// Of Feature 3DGS, or of GAGS, whose decoder tells it.
     Feature3dgs,
     LeGaussians,
 }
@@ -54,20 +62,24 @@ pub fn open_result(path: &Path, options: &ResultOptions) -> Result<MethodResult,
     match place(path)? {
         Some(ResultPlace::Thgs(file)) => thgs::read(&file),
         Some(ResultPlace::Saga(file)) => saga::read(&file),
+        Some(ResultPlace::Laga(file)) => laga::read(&file),
         Some(ResultPlace::Splat(splat, features)) => match features {
             SplatFeatures::Grouping => grouping::read(&splat, options),
             SplatFeatures::OpenGaussian => open_gaussian::read(&splat, options),
+            SplatFeatures::Feature3dgs if gags::is_result(&splat, options) => gags::read(&splat, options),
             SplatFeatures::Feature3dgs => feature_3dgs::read(&splat, options),
             SplatFeatures::LeGaussians => legaussians::read(&splat, options),
         },
         Some(ResultPlace::Levels(runs)) => langsplat::read(&runs, options),
         Some(ResultPlace::Ludvig(file)) => lifted::ludvig(&file),
         Some(ResultPlace::Distilled(file)) => lifted::distilled(&file),
+        Some(ResultPlace::Fused(file)) => semantic_gaussians::read(&file),
         None => Err(IoError::Unsupported {
             path: path.into(),
             what: "files of no method that is known".into(),
-            remedy: "known are Gaussian Grouping, Gaga, OmniSeg3D-GS, OpenGaussian, Feature 3DGS, SAGA, LEGaussians, \
-                     LangSplat, LangSplatV2, Occam's LGS, Dr.Splat, THGS, ReLaGS, splat-distiller and LUDVIG",
+            remedy: "known are Gaussian Grouping, Gaga, OmniSeg3D-GS, OpenGaussian, Feature 3DGS, SAGA, LaGa, \
+                     LEGaussians, GAGS, LangSplat, LangSplatV2, Occam's LGS, Dr.Splat, THGS, ReLaGS, \
+                     splat-distiller, LUDVIG and Semantic Gaussians",
         }),
     }
 }
@@ -81,7 +93,8 @@ pub(super) fn place(path: &Path) -> Result<Option<ResultPlace>, IoError> {
         return Ok(Some(ResultPlace::Thgs(file)));
     }
     if let Some(file) = features_of_saga(path) {
-        return Ok(Some(ResultPlace::Saga(file)));
+        let place = if laga::is_beside(&file) { ResultPlace::Laga } else { ResultPlace::Saga };
+        return Ok(Some(place(file)));
     }
     if let Some(splat) = splat_of(path)
         && let Some(features) = features_of(&splat)?
@@ -90,6 +103,9 @@ pub(super) fn place(path: &Path) -> Result<Option<ResultPlace>, IoError> {
     }
     if path.is_file() && is_splat(path) {
         return Ok(None);
+    }
+    if let Some(file) = semantic_gaussians::features_of(path) {
+        return Ok(Some(ResultPlace::Fused(file)));
     }
     if let Some(runs) = level_runs::find(path)? {
         return Ok(Some(ResultPlace::Levels(runs)));
@@ -111,13 +127,15 @@ fn named(path: &Path, is: impl Fn(&str) -> bool) -> Option<PathBuf> {
     files::names_in(path).ok()?.into_iter().find(|name| is(name)).map(|name| path.join(name))
 }
 
-/// SAGA's features, from any of its files or its folder.
+/// Features of SAGA or LaGa, from any of their files or their folder.
 fn features_of_saga(path: &Path) -> Option<PathBuf> {
     if path.is_dir() {
         return folder::latest(path, saga::FEATURES);
     }
     let name = path.file_name()?.to_string_lossy().into_owned();
-    let is_own = name == saga::FEATURES || name == "scene_point_cloud.ply" || name == "scale_gate.pt";
+    let own =
+        [saga::FEATURES, "scene_point_cloud.ply", "scale_gate.pt", laga::DESCRIPTORS, laga::WEIGHTS, laga::SCORES];
+    let is_own = own.contains(&name.as_str());
     let beside = || folder::latest(files::folder_of(path), saga::FEATURES);
     let above = || folder::latest(&folder::run_of(path), saga::FEATURES);
     if is_own { beside().or_else(above) } else { None }

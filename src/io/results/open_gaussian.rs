@@ -52,7 +52,7 @@ pub(super) fn read(splat: &Path, options: &ResultOptions) -> Result<MethodResult
         }
     }
     let features = FeatureRows::new(dim, values).unwrap_or_default();
-    let level = LevelValues::Clusters(ClusterLevel { of, features, leaves });
+    let level = LevelValues::Clusters(ClusterLevel { of, features, several: None, leaves });
     MethodResult::of_one_cloud(Method::OpenGaussian, splat, cloud, vec![("clusters".into(), level)])
 }
 

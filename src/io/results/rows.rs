@@ -76,6 +76,16 @@ impl FeatureRows {
         out
     }
 
+    /// Places the rows where `has` is true, in order, and zeros elsewhere; `None` if it is true another number of times.
+    pub(crate) fn spread(&self, has: &[bool]) -> Option<Self> {
+        let fits = has.iter().filter(|has| **has).count() == self.len();
+        let numbers = || match &self.numbers {
+            RowNumbers::Single(v) => RowNumbers::Single(spread(v, self.dim, has)),
+            RowNumbers::Half(v) => RowNumbers::Half(spread(v, self.dim, has)),
+        };
+        fits.then(|| Self { dim: self.dim, numbers: numbers() })
+    }
+
     /// All numbers, row after row.
     pub fn to_vec(&self) -> Vec<f32> {
         match &self.numbers {
@@ -100,6 +110,14 @@ impl FeatureRows {
             }),
         }
     }
+}
+
+/// Places rows where `has` is true, and zeros elsewhere.
+fn spread<T: Copy + Default>(values: &[T], dim: usize, has: &[bool]) -> Vec<T> {
+    let mut all = vec![T::default(); has.len() * dim];
+    let places = all.chunks_exact_mut(dim).zip(has).filter(|(_, has)| **has);
+    places.zip(values.chunks_exact(dim)).for_each(|((place, _), row)| place.copy_from_slice(row));
+    all
 }
 
 /// Number of the properties `<prefix>0`, `<prefix>1`, ... of a cloud.
@@ -182,5 +200,11 @@ mod tests {
         half.copy(1, 1, &mut part);
         assert_eq!(part, [0.0, 8.0]);
         assert_eq!((FeatureRows::new(4, vec![0.0; 6]), FeatureRows::new(0, vec![])), (None, None));
+        for rows in [&single, &half] {
+            let spread = rows.spread(&[false, true, false, true]).expect("two rows");
+            assert_eq!((spread.len(), spread.row(1), spread.row(3)), (4, rows.row(0), rows.row(1)));
+            assert_eq!((spread.row(0), spread.row(2)), (vec![0.0; 3], vec![0.0; 3]));
+            assert_eq!(rows.spread(&[true]), None);
+        }
     }
 }

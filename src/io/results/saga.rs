@@ -14,22 +14,12 @@ use crate::io::{IoError, files, memory, splat_ply};
 pub(super) const FEATURES: &str = "contrastive_feature_point_cloud.ply";
 /// Start of the properties' names.
 const PREFIX: &str = "f_";
-/// File of LaGa, which has features like SAGA's.
-const LAGAS: &str = "multi_lvl_cluster_features.pth";
 const GATE: &str = "scale_gate.pt";
 
 /// Reads a result; `file` has the features.
 pub(super) fn read(file: &Path) -> Result<MethodResult, IoError> {
-    if files::folder_of(file).join(LAGAS).is_file() {
-        let what = "LaGa's descriptors of clusters".into();
-        return Err(IoError::Unsupported { path: file.into(), what, remedy: "open scene_point_cloud.ply alone" });
-    }
     let features = features(file)?;
-    let splat = splat_of(file).ok_or_else(|| IoError::Unsupported {
-        path: file.into(),
-        what: "Gaussians without colors, whose colored ones (scene_point_cloud.ply) were not found".into(),
-        remedy: "open the folder of the run",
-    })?;
+    let splat = needed_splat(file)?;
     let cloud = splat_ply::read(&splat)?;
     let gate = files::folder_of(file).join(GATE);
     let gate = if gate.is_file() { Some(scale_gate(&gate, features.dim())?) } else { None };
@@ -74,6 +64,15 @@ pub(super) fn splat_of(file: &Path) -> Option<PathBuf> {
     let run = folder::run_of(file);
     let names = ["scene_point_cloud.ply", "point_cloud.ply"];
     names.iter().find_map(|name| folder::latest(&run, name).or_else(|| folder::latest(files::folder_of(file), name)))
+}
+
+/// Finds the Gaussians with their colors; the error says where they are looked for.
+pub(super) fn needed_splat(file: &Path) -> Result<PathBuf, IoError> {
+    splat_of(file).ok_or_else(|| IoError::Unsupported {
+        path: file.into(),
+        what: "Gaussians without colors, whose colored ones (scene_point_cloud.ply) were not found".into(),
+        remedy: "open the folder of the run",
+    })
 }
 
 fn features(file: &Path) -> Result<FeatureRows, IoError> {

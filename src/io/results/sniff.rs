@@ -3,9 +3,11 @@
 use std::path::{Path, PathBuf};
 
 use super::face::Method;
-use super::folder;
+use super::folder::{self, ResultOptions};
 use super::open::{self, ResultPlace, SplatFeatures};
-use super::{feature_3dgs, grouping, langsplat, legaussians, lifted, open_gaussian, saga, thgs};
+use super::{
+    feature_3dgs, gags, grouping, langsplat, legaussians, lifted, open_gaussian, saga, semantic_gaussians, thgs,
+};
 use crate::io::{files, gs_output, trained, transforms};
 
 /// Result of another method that was recognized.
@@ -25,11 +27,13 @@ pub fn sniff(path: &Path) -> Option<SniffedResult> {
     let (method, gaussians) = match open::place(path).ok()?? {
         ResultPlace::Thgs(file) => (Method::Thgs, thgs::splat_of(&file)?),
         ResultPlace::Saga(file) => (Method::Saga, saga::splat_of(&file)?),
+        ResultPlace::Laga(file) => (Method::Laga, saga::splat_of(&file)?),
         ResultPlace::Splat(splat, features) => {
             let method = match features {
                 SplatFeatures::Grouping if grouping::has_classes(&splat) => Method::GaussianGrouping,
                 SplatFeatures::Grouping => Method::OmniSeg3d,
                 SplatFeatures::OpenGaussian => Method::OpenGaussian,
+                SplatFeatures::Feature3dgs if gags::is_result(&splat, &ResultOptions::default()) => Method::Gags,
                 SplatFeatures::Feature3dgs => Method::Feature3dgs,
                 SplatFeatures::LeGaussians => Method::LeGaussians,
             };
@@ -42,6 +46,7 @@ pub fn sniff(path: &Path) -> Option<SniffedResult> {
         }
         ResultPlace::Ludvig(file) => (Method::Ludvig, lifted::gaussians_of(&file)),
         ResultPlace::Distilled(file) => (Method::SplatDistiller, lifted::splat_of(&file)?),
+        ResultPlace::Fused(file) => (semantic_gaussians::method_of(&file).ok()?, semantic_gaussians::splat_of(&file)?),
     };
     Some(SniffedResult { method, gaussians })
 }
@@ -91,6 +96,15 @@ mod tests {
             ("occams_lgs", Method::OccamsLgs),
             ("dr_splat", Method::DrSplat),
             ("ludvig/features.npy", Method::Ludvig),
+            ("splat_distiller", Method::SplatDistiller),
+            ("splat_distiller/ckpts/ckpt_29999_rank0_features.pt", Method::SplatDistiller),
+            ("gags", Method::Gags),
+            ("gags/decoder_chkpnt30000.pth", Method::Gags),
+            ("laga", Method::Laga),
+            ("laga/point_cloud/iteration_30000/multi_lvl_seg_scores.pth", Method::Laga),
+            ("semantic_gaussians", Method::SemanticGaussians),
+            ("semantic_gaussians/fusion", Method::SemanticGaussians),
+            ("semantic_gaussians/fusion/0.pt", Method::SemanticGaussians),
         ] {
             let found = sniff(&samples().join(path)).expect(path);
             assert_eq!(found.method, method, "{path}");

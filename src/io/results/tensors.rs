@@ -69,6 +69,26 @@ impl<'a> Tensors<'a> {
         rows.finite(self.path, name)
     }
 
+    /// The column with the largest number of each row, the first of equal ones, and the number of columns.
+    pub(super) fn largest_columns(&mut self, name: &str) -> Result<(Vec<i64>, usize), IoError> {
+        let dim = self.dim(name)?;
+        let (mut all, mut bad) = (Vec::new(), None);
+        let mut each = |first: usize, block: &[f32]| {
+            for (k, row) in block.chunks_exact(dim).enumerate() {
+                if row.iter().any(|v| !v.is_finite()) {
+                    bad.get_or_insert(first + k);
+                }
+                let best = (0..dim).reduce(|a, b| if row[b] > row[a] { b } else { a });
+                all.push(best.map_or(-1, |best| best as i64));
+            }
+        };
+        self.file.blocks(name, BLOCK_ROWS, &mut each).map_err(|e| e.of(self.path))?;
+        match bad {
+            None => Ok((all, dim)),
+            Some(row) => Err(self.error(name, format!("has a number in row {row} that is not finite"))),
+        }
+    }
+
     fn dim(&self, name: &str) -> Result<usize, IoError> {
         let shape = self.shape(name).ok_or_else(|| self.error(name, "is not there".into()))?;
         let dim = shape.iter().skip(1).product();

@@ -30,7 +30,8 @@ fn bits(v: &[f32]) -> Vec<u32> {
     v.iter().map(|v| v.to_bits()).collect()
 }
 
-fn codes(level: &ResultLevel) -> Vec<f32> {
+/// All codes of a level, one after the other.
+pub(super) fn codes(level: &ResultLevel) -> Vec<f32> {
     let LevelValues::Embedded(embedded) = &level.values else { panic!("no embeddings") };
     let dim = embedded.codes.dim();
     let mut all = vec![0.0; embedded.codes.len() * dim];
@@ -119,6 +120,20 @@ fn saga_has_its_features_and_its_gate() {
         let at = gate.as_ref().expect("a gate").at(0.5);
         let wanted = expected("saga/expected/gate_at_half.npy");
         assert!(at.iter().zip(&wanted).all(|(a, b)| (a - b).abs() < 1e-6), "{at:?}");
+    }
+}
+
+#[test]
+fn gags_has_its_codes_and_a_decoder_with_skips() {
+    for path in ["gags", "gags/point_cloud/iteration_30000/point_cloud.ply", "gags/decoder_chkpnt30000.pth"] {
+        let result = sample(path);
+        is_the_scene(&result, 32);
+        assert_eq!((result.method, result.method.encoder()), (Method::Gags, Some(OPEN_CLIP)), "{path}");
+        assert_eq!(bits(&codes(&result.levels[0])), bits(&expected("gags/expected/codes.npy")));
+        let LevelValues::Embedded(level) = &result.levels[0].values else { panic!("no embeddings") };
+        assert_eq!((level.decoder.inputs(), level.decoder.outputs()), (16, 512));
+        let count = |wanted| level.decoder.split().0.iter().filter(|step| **step == wanted).count();
+        assert_eq!([DecoderStep::Relu, DecoderStep::Keep, DecoderStep::AddKept].map(count), [8, 2, 2]);
     }
 }
 
@@ -212,25 +227,75 @@ fn thgs_has_its_superpoints() {
 }
 
 #[test]
+fn laga_has_clusters_with_several_embeddings() {
+    let folder = "laga/point_cloud/iteration_30000";
+    let (descriptors, splat) =
+        (format!("{folder}/multi_lvl_cluster_features.pth"), format!("{folder}/scene_point_cloud.ply"));
+    for path in ["laga", &descriptors, &splat] {
+        let result = sample(path);
+        is_the_scene(&result, 32);
+        assert_eq!((result.method, result.method.encoder()), (Method::Laga, Some(OPEN_CLIP)), "{path}");
+        let names: Vec<&str> = result.levels.iter().map(|level| level.name.as_str()).collect();
+        assert_eq!(names, ["small", "medium", "large"]);
+        for (k, level) in result.levels.iter().enumerate() {
+            let of = |name: &str, k: usize| format!("laga/expected/{name}_{}.npy", k + 1);
+            let LevelValues::Clusters(clusters) = &level.values else { panic!("no clusters") };
+            let numbers: Vec<i64> = clusters.of.iter().map(|c| i64::from(c.expect("a cluster"))).collect();
+            assert_eq!(Some(numbers), array(&of("clusters", k)).integers());
+            let several = clusters.several.as_ref().expect("several embeddings");
+            assert_eq!((several.each, clusters.count()), (2, [4, 4, 2][k]));
+            assert_eq!(bits(&several.weights), bits(&expected(&of("weights", k))));
+            let first = [clusters.features.row(0), clusters.features.row(1)].concat();
+            assert_eq!(bits(&first), bits(&expected(&of("features_first_rows", k))));
+            let other = expected(&of("features_first_rows", (k + 1) % 3));
+            assert_ne!(bits(&first), bits(&other), "the control: a level exchanged");
+        }
+    }
+}
+
+#[test]
+fn semantic_gaussians_has_features_of_those_that_are_shown() {
+    let shown = expected("semantic_gaussians/expected/seen.npy");
+    let first = expected("semantic_gaussians/expected/features_first_rows.npy");
+    for path in ["semantic_gaussians", "semantic_gaussians/fusion", "semantic_gaussians/fusion/0.pt"] {
+        let result = sample(path);
+        is_the_scene(&result, 32);
+        assert_eq!((result.method, result.method.encoder()), (Method::SemanticGaussians, Some(CLIP_B32)), "{path}");
+        assert_eq!(result.cameras.len(), 2);
+        let codes = codes(&result.levels[0]);
+        let rows: Vec<&[f32]> = codes.chunks_exact(512).collect();
+        let is_there = |row: &&[f32]| row.iter().any(|v| *v != 0.0);
+        assert!(rows.iter().zip(&shown).all(|(row, shown)| is_there(row) == (*shown != 0.0)));
+        let there: Vec<f32> = rows.into_iter().filter(is_there).take(2).flatten().copied().collect();
+        assert_eq!(bits(&there), bits(&first));
+    }
+    assert!(shown.contains(&0.0) && shown.contains(&1.0));
+}
+
+#[test]
 fn lifted_embeddings_are_read() {
     let ludvig = sample("ludvig");
     let file = std::fs::read(samples().join("ludvig/features.npy")).expect("the sample");
-    let codes = codes(&ludvig.levels[0]);
+    let own = codes(&ludvig.levels[0]);
     // The array is the end of its file.
-    let stored = file[file.len() - 4 * codes.len()..].chunks_exact(4);
+    let stored = file[file.len() - 4 * own.len()..].chunks_exact(4);
     let stored: Vec<f32> = stored.map(|b| f32::from_le_bytes([b[0], b[1], b[2], b[3]])).collect();
-    assert!(ludvig.method == Method::Ludvig && bits(&codes) == bits(&stored));
+    assert!(ludvig.method == Method::Ludvig && bits(&own) == bits(&stored));
+    let distilled = sample("splat_distiller");
+    assert_eq!((distilled.method, distilled.cloud.len()), (Method::SplatDistiller, 16));
+    let first = expected("splat_distiller/expected/features_first_rows.npy");
+    let halves: Vec<f32> = first.iter().map(|v| half::f16::from_f32(*v).to_f32()).collect();
+    assert_eq!(bits(&codes(&distilled.levels[0])[..first.len()]), bits(&halves));
 }
 
-fn refused(path: &Path) -> String {
+/// The reason for which a result is refused.
+pub(super) fn refused(path: &Path) -> String {
     open_result(path, &ResultOptions::default()).expect_err("refused").to_string()
 }
 
 #[test]
 fn what_cannot_be_opened_exactly_is_refused_with_the_reason() {
     for (path, says) in [
-        ("gags", "GAGS"),
-        ("laga", "LaGa"),
         ("3dgs/chkpnt30000.pth", "without language features"),
         ("3dgs", "without language features"),
         ("2dgs", "files of no method"),
@@ -255,44 +320,6 @@ pub(crate) fn copied(from: &Path, to: &Path) {
 }
 
 #[test]
-fn files_of_other_runs_and_missing_files_are_named() {
-    let folder = tempfile::tempdir().expect("folder");
-    let copy = |name: &str| {
-        let to = folder.path().join(name);
-        copied(&samples().join(name), &to);
-        to
-    };
-    let langsplat = copy("langsplat");
-    std::fs::remove_dir_all(langsplat.join("autoencoder")).expect("removed");
-    assert!(refused(&langsplat.join("output")).contains("autoencoder"));
-    let named = samples().join("langsplat/autoencoder/ckpt/made_up/best_ckpt.pth");
-    let options = ResultOptions { decoder: Some(named), ..ResultOptions::default() };
-    assert!(open_result(&langsplat.join("output"), &options).is_ok(), "a decoder that is named");
-    // Sixteen Gaussians with the clusters of thirty-two.
-    let open_gaussian = copy("opengaussian");
-    let small = samples().join("feature_3dgs/lseg/point_cloud/iteration_7000/point_cloud.ply");
-    let own = open_gaussian.join("point_cloud/iteration_70000/point_cloud.ply");
-    let text = std::fs::read(&own).expect("read");
-    std::fs::remove_file(open_gaussian.join("cluster_lang.npz")).expect("removed");
-    assert!(refused(&open_gaussian).contains("cluster_lang.npz"));
-    assert!(!text.is_empty() && small.is_file());
-    let saga = copy("saga");
-    std::fs::remove_dir_all(saga.join("point_cloud/iteration_30000")).expect("removed");
-    assert!(refused(&saga).contains("scene_point_cloud.ply"));
-    let thgs = copy("thgs");
-    std::fs::copy(samples().join("ludvig/gaussians.ply"), thgs.join("point_cloud/iteration_30000/point_cloud.ply"))
-        .expect("copied");
-    assert!(refused(&thgs).contains("not of one run"), "{}", refused(&thgs));
-    let grouping = copy("gaussian_grouping");
-    std::fs::copy(
-        samples().join("saga/point_cloud/iteration_10000/scale_gate.pt"),
-        grouping.join("point_cloud/iteration_30000/classifier.pth"),
-    )
-    .expect("copied");
-    assert!(refused(&grouping).contains("'weight'"), "{}", refused(&grouping));
-}
-
-#[test]
 fn cut_files_are_errors_wherever_they_end() {
     let folder = tempfile::tempdir().expect("folder");
     for (sample, file) in [
@@ -302,6 +329,10 @@ fn cut_files_are_errors_wherever_they_end() {
         ("langsplat_v2", "output/made_up_0_2/chkpnt10000.pth"),
         ("saga", "point_cloud/iteration_10000/contrastive_feature_point_cloud.ply"),
         ("ludvig", "features.npy"),
+        ("splat_distiller", "ckpts/ckpt_29999_rank0_features.pt"),
+        ("gags", "decoder_chkpnt30000.pth"),
+        ("laga", "point_cloud/iteration_30000/multi_lvl_seg_scores.pth"),
+        ("semantic_gaussians", "fusion/0.pt"),
     ] {
         let to = folder.path().join(sample);
         copied(&samples().join(sample), &to);

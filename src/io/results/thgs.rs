@@ -28,7 +28,10 @@ pub(super) fn read(file: &Path) -> Result<MethodResult, IoError> {
         let features = tensors.rows(&format!("nag_feat.{k}"))?;
         let labels = format!("nag.{}", k + 1);
         let of = clusters_of(&tensors.integers(&labels)?, features.len()).map_err(|e| tensors.error(&labels, e))?;
-        levels.push(((*name).to_owned(), LevelValues::Clusters(ClusterLevel { of, features, leaves: None })));
+        levels.push((
+            (*name).to_owned(),
+            LevelValues::Clusters(ClusterLevel { of, features, several: None, leaves: None }),
+        ));
     }
     MethodResult::of_one_cloud(Method::Thgs, &splat, cloud, levels)
 }

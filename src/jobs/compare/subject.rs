@@ -154,7 +154,7 @@ struct EncodedPhrase {
 
 impl EncodedPhrase {
     fn new(method: Method, phrase: &str, vectors: &mut KnownVectors<'_>) -> Result<Self, JobError> {
-        let encoder = method.encoder().ok_or(ForeignError::NoLanguage(method.name()))?;
+        let encoder = method.encoder().ok_or_else(|| ForeignError::of_silent(method))?;
         Ok(Self { query: vectors.get(encoder, phrase)?.0, canonical: vectors.canonical(encoder)? })
     }
 
@@ -170,7 +170,7 @@ impl PhraseAnswers for ForeignAnswers {
     }
 
     fn encode(&mut self, phrase: &str, vectors: &mut KnownVectors<'_>) -> Result<f64, JobError> {
-        let encoder = self.method.encoder().ok_or(ForeignError::NoLanguage(self.method.name()))?;
+        let encoder = self.method.encoder().ok_or_else(|| ForeignError::of_silent(self.method))?;
         vectors.canonical(encoder)?;
         Ok(vectors.get(encoder, phrase)?.1)
     }

@@ -59,6 +59,7 @@ pub(super) fn with_photos(scene: Scene, observer: &mut dyn Observer) -> OpenedSc
         let so = match method.kind() {
             MethodKind::Classes | MethodKind::Clusters => "its groups of Gaussians are objects",
             MethodKind::Affinities => "'fmlgs import' finds its objects",
+            MethodKind::Embeddings if method.encoder().is_none() => "the text encoder of its embeddings is missing",
             MethodKind::Embeddings => "'fmlgs query' asks its embeddings",
         };
         observer.note(Severity::Info, format!("{} is a result of {}: {so}", scene.name, method.name()));

@@ -69,6 +69,9 @@ mod tests {
             ("thgs", Method::Thgs, true),
             ("langsplat/output", Method::LangSplat, false),
             ("saga", Method::Saga, false),
+            ("laga", Method::Laga, true),
+            ("gags", Method::Gags, false),
+            ("semantic_gaussians/fusion", Method::SemanticGaussians, false),
         ] {
             let scene = open::scene(&samples().join(path)).expect(path);
             assert_eq!((scene.method, scene.cloud.len(), scene.cameras.len()), (Some(method), 32, 2), "{path}");

@@ -6,6 +6,7 @@ use rayon::prelude::*;
 
 use super::blend::{self, BlendedCodes};
 use super::cosines::CosineHead;
+use super::descriptors::{self, DescriptorAnswer};
 use super::{ForeignError, ForeignPhrase};
 use crate::io::results::{ClusterLevel, LevelValues, MethodResult, ResultLevel};
 use crate::math::vector::{dot, unit};
@@ -88,7 +89,7 @@ impl ForeignScene {
                 }
                 (LevelValues::Clusters(clusters), _) => {
                     let of: Vec<u32> = clusters.of.iter().map(|c| c.map_or(0, |c| c + 1)).collect();
-                    let groups: Vec<u32> = (0..=clusters.features.len() as u32).collect();
+                    let groups: Vec<u32> = (0..=clusters.count() as u32).collect();
                     let settings = RenderSettings::of_mode(level.cloud.render_mode);
                     LevelView::Winners(renderer.label_winners(&level.cloud, (&of, &groups), camera, &settings)?)
                 }
@@ -103,14 +104,14 @@ impl ForeignScene {
         match phrases.iter().map(|p| p.len()).find(|have| *have != want) {
             None => Ok(()),
             Some(have) => {
-                let encoder = method.encoder().unwrap_or_default();
+                let encoder = method.encoder().or(method.missing_encoder()).unwrap_or_default();
                 Err(ForeignError::Dimension { have, want, method: method.name(), encoder })
             }
         }
     }
 
     fn no_language(&self) -> ForeignError {
-        ForeignError::NoLanguage(self.result.method.name())
+        ForeignError::of_silent(self.result.method)
     }
 
     /// Cosines of each Gaussian of a level with each phrase.
@@ -122,12 +123,13 @@ impl ForeignScene {
             }
             (LevelValues::Clusters(clusters), _) => {
                 self.fits(clusters.features.dim(), phrases)?;
-                let of_clusters = cluster_cosines(clusters, phrases);
-                let of = |cosines: &Vec<f32>| {
+                let of_rows = cluster_cosines(clusters, phrases);
+                let of_clusters = of_rows.iter().map(|cosines| descriptors::nearest(clusters, cosines));
+                let of = |cosines: Vec<f32>| {
                     let one = |c: &Option<u32>| c.map_or(0.0, |c| cosines[c as usize]);
                     clusters.of.par_iter().map(one).collect()
                 };
-                Ok(of_clusters.iter().map(of).collect())
+                Ok(of_clusters.map(of).collect())
             }
             _ => Err(self.no_language()),
         }
@@ -143,15 +145,25 @@ impl ForeignScene {
         Ok(relevancy_of(&self.gaussian_cosines(level, &all_of(phrase))?, phrase.temperature, 0.0))
     }
 
-    /// Relevancy of each cluster; 0 for those without an embedding.
+    /// Relevancy of each cluster, times its weight if it has several embeddings; 0 for those without one.
     pub(crate) fn cluster_relevancy(
         &self,
         clusters: &ClusterLevel,
         phrase: ForeignPhrase<'_>,
     ) -> Result<Vec<f32>, ForeignError> {
+        Ok(self.cluster_answers(clusters, phrase)?.into_iter().map(|answer| answer.relevancy).collect())
+    }
+
+    /// Relevancy of each cluster with the cosine that it comes from.
+    pub(crate) fn cluster_answers(
+        &self,
+        clusters: &ClusterLevel,
+        phrase: ForeignPhrase<'_>,
+    ) -> Result<Vec<DescriptorAnswer>, ForeignError> {
         let all = all_of(phrase);
         self.fits(clusters.features.dim(), &all)?;
-        Ok(relevancy_of(&cluster_cosines(clusters, &all), phrase.temperature, 0.0))
+        let cosines = cluster_cosines(clusters, &all);
+        Ok(descriptors::answers(clusters, &relevancy_of(&cosines, phrase.temperature, 0.0), &cosines[0]))
     }
 
     /// Cosines of each pixel of a view with each phrase, by the blended codes of a level.
@@ -239,7 +251,7 @@ fn relevancy_of(cosines: &[Vec<f32>], temperature: f32, of_nothing: f32) -> Vec<
     (0..query.len()).into_par_iter().with_min_len(1 << 12).map(one).collect()
 }
 
-/// Cosines of clusters with phrases; 0 for clusters without an embedding.
+/// Cosines of the embeddings of clusters with phrases; 0 for those of no length.
 pub(crate) fn cluster_cosines(clusters: &ClusterLevel, phrases: &[&[f32]]) -> Vec<Vec<f32>> {
     let units: Vec<Option<Vec<f32>>> = (0..clusters.features.len()).map(|k| unit(&clusters.features.row(k))).collect();
     let of = |phrase: &&[f32]| units.iter().map(|u| u.as_ref().map_or(0.0, |u| dot(u, phrase))).collect();

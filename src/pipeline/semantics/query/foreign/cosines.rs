@@ -80,13 +80,15 @@ impl CosineHead {
     /// k]`. Codes whose embedding has no length are alike to nothing.
     pub(crate) fn cosines(&self, codes: &[f32], directions: &Directions, out: &mut [f32]) {
         debug_assert_eq!((codes.len(), out.len()), (self.inputs * BLOCK, directions.len() * BLOCK));
-        let mut hidden = codes.to_vec();
+        let (mut hidden, mut kept) = (codes.to_vec(), Vec::new());
         for step in &self.before {
             match step {
                 DecoderStep::Linear(layer) => hidden = linear(layer, &hidden),
                 DecoderStep::Relu => hidden.iter_mut().for_each(|v| *v = v.max(0.0)),
                 DecoderStep::Unit => unit(&mut hidden),
                 DecoderStep::Softmax => softmax(&mut hidden),
+                DecoderStep::Keep => kept.clone_from(&hidden),
+                DecoderStep::AddKept => hidden.iter_mut().zip(&kept).for_each(|(v, kept)| *v += kept),
             }
         }
         let squares = match &self.last {

@@ -86,12 +86,11 @@ struct Known<'a> {
 }
 
 impl Known<'_> {
-    /// Adds the embedding of the next identity, a part of a whole if that has one.
-    fn add(&mut self, own: Option<Vec<f32>>, whole: Option<&[f32]>) {
-        let deviated =
-            own.as_ref().map(|own| whole.and_then(|w| deviate(own, w, PART_WEIGHT)).unwrap_or_else(|| own.clone()));
-        self.by_identity
-            .push(ViewFeatures { raw: own.into_iter().collect(), deviated: deviated.into_iter().collect() });
+    /// Adds the embeddings of the next identity, a part of a whole if that has one.
+    fn add(&mut self, raw: Vec<Vec<f32>>, whole: Option<&[f32]>) {
+        let deviated = |own: &Vec<f32>| whole.and_then(|w| deviate(own, w, PART_WEIGHT)).unwrap_or_else(|| own.clone());
+        let deviated = raw.iter().map(deviated).collect();
+        self.by_identity.push(ViewFeatures { raw, deviated });
     }
 
     fn language(self) -> LanguageFeatures {
@@ -104,11 +103,26 @@ fn known<'a>(result: &'a MethodResult, clusters: &ClusterLevel) -> Known<'a> {
     Known { encoder, dimension: clusters.features.dim(), by_identity: Vec::new() }
 }
 
+/// Embeddings of a cluster that count, of unit length.
+fn units(clusters: &ClusterLevel, k: u32) -> Vec<Vec<f32>> {
+    let counting = clusters.weighted(k as usize).filter(|(_, weight)| *weight > 0.0);
+    counting.filter_map(|(row, _)| unit(&clusters.features.row(row))).collect()
+}
+
+/// The direction of a cluster: its embedding, or the weighed mean of several.
+fn direction(clusters: &ClusterLevel, k: u32) -> Option<Vec<f32>> {
+    let mut sum = vec![0.0; clusters.features.dim()];
+    for (row, weight) in clusters.weighted(k as usize) {
+        sum.iter_mut().zip(clusters.features.row(row)).for_each(|(sum, v)| *sum += weight * v);
+    }
+    unit(&sum)
+}
+
 /// Clusters of one level, as objects.
 fn flat(result: &MethodResult, clusters: &ClusterLevel) -> SemanticMap {
     let numbered = Numbered::new(&clusters.of, |_| Vec::new());
     let mut known = known(result, clusters);
-    numbered.known.keys().for_each(|k| known.add(unit(&clusters.features.row(*k as usize)), None));
+    numbered.known.keys().for_each(|k| known.add(units(clusters, *k), None));
     numbered.map(&result.cloud, Some(known.language()))
 }
 
@@ -119,7 +133,7 @@ fn nested(result: &MethodResult, wholes: &ClusterLevel, parts: &ClusterLevel) ->
     const SAME: f64 = 0.9;
     let mut numbered = Numbered::new(&wholes.of, |_| Vec::new());
     let mut known = known(result, wholes);
-    numbered.known.keys().for_each(|k| known.add(unit(&wholes.features.row(*k as usize)), None));
+    numbered.known.keys().for_each(|k| known.add(units(wholes, *k), None));
     let mut shared: BTreeMap<u32, BTreeMap<u32, usize>> = BTreeMap::new();
     let mut sizes: BTreeMap<u32, usize> = BTreeMap::new();
     for (whole, part) in wholes.of.iter().zip(&parts.of) {
@@ -138,8 +152,7 @@ fn nested(result: &MethodResult, wholes: &ClusterLevel, parts: &ClusterLevel) ->
             continue;
         }
         let id = numbered.identities.add(Level::Part, numbered.known[whole], Vec::new());
-        let of_whole = unit(&wholes.features.row(*whole as usize));
-        known.add(unit(&parts.features.row(*part as usize)), of_whole.as_deref());
+        known.add(units(parts, *part), direction(wholes, *whole).as_deref());
         ids.insert(*part, (*whole, id));
     }
     for (i, (whole, part)) in wholes.of.iter().zip(&parts.of).enumerate() {

@@ -3,7 +3,8 @@
 //! 1. [`cosines`] compares codes with phrases through their decoder.
 //! 2. [`blend`] renders the codes of a view; [`classes`] and [`click`] read classes and clicks from them.
 //! 3. [`asked`] holds a result with what is computed once, and gives relevancy of Gaussians and pixels.
-//! 4. [`own_rules`] makes masks as each method does, and one as this program does.
+//! 4. [`own_rules`] makes masks as each method does ([`laga`] LaGa's), and one as this program does; [`descriptors`]
+//!    answers from clusters with several embeddings.
 //! 5. [`identities`] and [`affinity`] make a `SemanticMap` of what a method has: classes, clusters, alike features.
 //!
 //! Embeddings of phrases come from the caller: [`Method::encoder`](crate::io::results::Method::encoder) names the
@@ -15,12 +16,15 @@ pub mod blend;
 pub mod classes;
 pub mod click;
 pub(crate) mod cosines;
+pub(crate) mod descriptors;
 pub mod identities;
+mod laga;
 pub mod own_rules;
 
 #[cfg(test)]
 mod tests;
 
+use crate::io::results::Method;
 use crate::render::{DrawError, RenderError};
 
 /// A phrase as other methods compare it.
@@ -42,6 +46,11 @@ pub enum ForeignError {
     Draw(#[from] DrawError),
     #[error("the result of {0} knows no language; name its objects, and ask for the names")]
     NoLanguage(&'static str),
+    #[error(
+        "the result of {method} is compared with phrases by {encoder}, which is not in the list of models; fuse \
+         features of LSeg, of 512 numbers, or open its Gaussians alone"
+    )]
+    NoEncoder { method: &'static str, encoder: &'static str },
     #[error("the result of {0} has no classes or clusters")]
     NoIdentities(&'static str),
     #[error("{0} has no rule of its own for masks of phrases")]
@@ -50,6 +59,14 @@ pub enum ForeignError {
     Dimension { have: usize, want: usize, method: &'static str, encoder: &'static str },
     #[error("there is no level {0}")]
     Level(usize),
+}
+
+impl ForeignError {
+    /// The reason for which a method without an encoder answers no phrase.
+    pub(crate) fn of_silent(method: Method) -> Self {
+        let name = method.name();
+        method.missing_encoder().map_or(Self::NoLanguage(name), |encoder| Self::NoEncoder { method: name, encoder })
+    }
 }
 
 impl From<RenderError> for ForeignError {

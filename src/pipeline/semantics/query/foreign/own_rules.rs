@@ -12,7 +12,7 @@ use crate::scene::Mask;
 
 /// Opacity that belongs to a silhouette (OpenGaussian).
 const SILHOUETTE: f32 = 0.7;
-/// Blended membership that belongs to a segment (THGS).
+/// Blended membership that belongs to a mask (THGS, LaGa).
 const MEMBERSHIP: f32 = 0.5;
 /// Segments of an answer (THGS).
 const SEGMENTS: usize = 3;
@@ -59,7 +59,7 @@ impl ForeignScene {
         };
         let covered = |(mask, values), level, rule| ForeignMask { mask, level, values, peak: None, rule };
         match method {
-            Method::LangSplat | Method::LangSplatV2 | Method::OccamsLgs => {
+            Method::LangSplat | Method::LangSplatV2 | Method::OccamsLgs | Method::Gags => {
                 let each = |level| self.relevancy_of_method(renderer, view, level, phrase);
                 let levels = self.of_levels(each)?;
                 ForeignMask::of_level(by_smoothing(&levels, w, h), BY_SMOOTHING)
@@ -83,7 +83,8 @@ impl ForeignScene {
             }
             Method::Thgs => {
                 let levels = self.result.levels.len();
-                let found = self.segments(renderer, view, phrase.query, levels.saturating_sub(2)..levels)?;
+                let members = self.members(phrase.query, levels.saturating_sub(2)..levels);
+                let found = self.membership(renderer, view, &members)?;
                 let rule = "best 3 segments of the two coarse levels; membership over 0.5";
                 Ok(covered(found, levels.saturating_sub(2), rule))
             }
@@ -93,8 +94,19 @@ impl ForeignScene {
                 let found = silhouette(renderer, of, view, |i| relevancy[i] > 0.5)?;
                 Ok(covered(found, 0, "Gaussians of relevancy over 0.5; silhouette over 0.7"))
             }
-            Method::GaussianGrouping | Method::OmniSeg3d | Method::Saga => Err(ForeignError::NoLanguage(method.name())),
-            Method::SplatDistiller | Method::Ludvig => Err(ForeignError::NoRule(method.name())),
+            Method::Laga => {
+                let chosen = self.chosen_by_descriptors(phrase)?;
+                let found = self.membership(renderer, view, &chosen)?;
+                let rule = "Gaussians over 0.6 of the range of relevancy and of a cosine of 0.23 or more, unfiltered; \
+                            membership over 0.5";
+                Ok(covered(found, 0, rule))
+            }
+            Method::GaussianGrouping | Method::OmniSeg3d | Method::Saga | Method::SemanticGaussiansOpenSeg => {
+                Err(ForeignError::of_silent(method))
+            }
+            Method::SplatDistiller | Method::Ludvig | Method::SemanticGaussians => {
+                Err(ForeignError::NoRule(method.name()))
+            }
         }
     }
 
@@ -119,15 +131,13 @@ impl ForeignScene {
         (0..self.result.levels.len()).map(each).collect()
     }
 
-    /// Pixels whose blended membership in the best segments of these levels is over a half.
-    fn segments(
+    /// Pixels of which these Gaussians make more than a half, and how much they do.
+    fn membership(
         &self,
         renderer: &mut Renderer,
         view: &ForeignView,
-        query: &[f32],
-        levels: std::ops::Range<usize>,
+        members: &[bool],
     ) -> Result<(Mask, Vec<f32>), ForeignError> {
-        let members = self.members(query, levels);
         let copy = |i: usize, _: usize, out: &mut [f32]| out.fill(f32::from(u8::from(members[i])));
         let mut blended =
             blend::blend(renderer, &self.result.cloud, BlendSource { dim: 1, copy: &copy }, &view.camera)?;

@@ -115,6 +115,18 @@ fn a_layer_exchanged_or_a_codebook_turned_is_noticed() {
     let camera = result.cameras[0].camera.clone();
     let difference = relevancy_apart(&mut Seen::of(result, &camera), 0, "langsplat", "_1", &texts);
     assert!(difference > 10.0 * TOLERANCE, "{difference}");
+    // GAGS's decoder without what skips its layers.
+    let blended = interleaved(Seen::new("gags").view.blended(0).expect("blended"));
+    assert!(apart(&blended, &expected("gags/expected/codes_pixels.npy")) < TOLERANCE);
+    let mut result = sample("gags");
+    let LevelValues::Embedded(level) = &mut result.levels[0].values else { panic!("no embeddings") };
+    let (before, last) = level.decoder.split();
+    let mut steps = before.to_vec();
+    steps.retain(|step| !matches!(step, DecoderStep::Keep | DecoderStep::AddKept));
+    steps.push(DecoderStep::Linear(last.expect("a layer").clone()));
+    level.decoder = Decoder::new(16, steps, path).expect("fits");
+    let difference = relevancy_apart(&mut Seen::of(result, &camera), 0, "gags", "", &texts);
+    assert!(difference > 10.0 * TOLERANCE, "{difference}");
     // LangSplatV2's codebook is read column by column.
     let mut result = sample("langsplat_v2/output");
     let LevelValues::Embedded(level) = &mut result.levels[0].values else { panic!("no embeddings") };
@@ -129,15 +141,20 @@ fn a_layer_exchanged_or_a_codebook_turned_is_noticed() {
 #[test]
 fn embeddings_of_gaussians_answer_like_the_reference() {
     let texts = Texts::new();
-    for (folder, place, levels) in
-        [("occams_lgs", "occams_lgs", 3), ("ludvig", "ludvig", 1), ("legaussians", "legaussians/output", 1)]
-    {
+    for (folder, place, levels) in [
+        ("occams_lgs", "occams_lgs", 3),
+        ("ludvig", "ludvig", 1),
+        ("legaussians", "legaussians/output", 1),
+        ("splat_distiller", "splat_distiller", 1),
+        ("gags", "gags", 1),
+        ("semantic_gaussians", "semantic_gaussians", 1),
+    ] {
         let mut seen = Seen::new(place);
         for level in 0..levels {
             let suffix = if levels > 1 { format!("_{}", level + 1) } else { String::new() };
             let difference = relevancy_apart(&mut seen, level, folder, &suffix, &texts);
-            // Occam's embeddings are kept in half the memory.
-            let most = if folder == "occams_lgs" { 1e-3 } else { TOLERANCE };
+            // These were stored in full, and are kept in half the memory.
+            let most = if ["occams_lgs", "splat_distiller"].contains(&folder) { 1e-3 } else { TOLERANCE };
             assert!(difference < most, "{folder} {level}: {difference}");
         }
     }
@@ -233,6 +250,61 @@ fn clusters_of_open_gaussian_answer_like_the_reference() {
 }
 
 #[test]
+fn descriptors_of_laga_answer_like_the_reference() {
+    let texts = Texts::new();
+    let mut seen = Seen::new("laga");
+    let at = |name: &str| expected(&format!("laga/expected/{name}.npy"));
+    for level in 0..3 {
+        let found = seen.scene.gaussian_relevancy(level, texts.phrase()).expect("answered");
+        let of = |level: usize| at(&format!("relevancy_gaussians_{}", level + 1));
+        assert!(apart(&found, &of(level)) < TOLERANCE, "{level}");
+        assert!(apart(&found, &of((level + 1) % 3)) > 10.0 * TOLERANCE, "the control: another level");
+    }
+    let parts = |scene: &ForeignScene| -> (Vec<f32>, Vec<f32>) {
+        let answers = scene.descriptor_answers(texts.phrase()).expect("answered");
+        answers.into_iter().map(|answer| (answer.relevancy, answer.cosine)).unzip()
+    };
+    let (relevancy, cosines) = parts(&seen.scene);
+    assert!(apart(&relevancy, &at("relevancy_gaussians")) < TOLERANCE);
+    assert!(apart(&cosines, &at("cosine_gaussians")) < TOLERANCE);
+    let chosen = seen.scene.chosen_by_descriptors(texts.phrase()).expect("answered");
+    let chosen: Vec<f32> = chosen.into_iter().map(|chosen| f32::from(u8::from(chosen))).collect();
+    assert_eq!(chosen, at("chosen_gaussians"));
+    let own = seen.scene.own_mask(&mut seen.renderer, &seen.view, texts.phrase()).expect("answered");
+    let membership = at("membership_pixels");
+    assert!(apart(&own.values, &membership) < TOLERANCE);
+    let inside: Vec<usize> = (0..membership.len()).filter(|i| membership[*i] > 0.5).collect();
+    assert_eq!(own.mask.pixels().collect::<Vec<_>>(), inside);
+    assert!(!inside.is_empty());
+    // The weights of a level in another order.
+    let mut result = sample("laga");
+    let LevelValues::Clusters(clusters) = &mut result.levels[0].values else { panic!("no clusters") };
+    clusters.several.as_mut().expect("several").weights.reverse();
+    let (turned, _) = parts(&ForeignScene::new(Arc::new(result)));
+    assert!(apart(&turned, &at("relevancy_gaussians")) > 10.0 * TOLERANCE, "the control: weights exchanged");
+}
+
+#[test]
+fn rows_of_semantic_gaussians_that_are_exchanged_are_noticed() {
+    use crate::io::results::{FeatureRows, LevelCodes};
+    let (texts, mut result) = (Texts::new(), sample("semantic_gaussians"));
+    let camera = result.cameras[0].camera.clone();
+    let seen = Seen::of(sample("semantic_gaussians"), &camera);
+    let found = seen.scene.gaussian_cosines(0, &texts.all()).expect("answered");
+    let rows: Vec<f32> = (0..32).flat_map(|i| found.iter().map(move |of| of[i]).collect::<Vec<_>>()).collect();
+    assert!(apart(&rows, &expected("semantic_gaussians/expected/cosines_gaussians.npy")) < TOLERANCE);
+    let none = seen.scene.own_mask(&mut Renderer::new(), &seen.view, texts.phrase());
+    assert!(matches!(none, Err(ForeignError::NoRule("Semantic Gaussians"))));
+    // Each Gaussian gets the row of the one before.
+    let LevelValues::Embedded(level) = &mut result.levels[0].values else { panic!("no embeddings") };
+    let LevelCodes::Dense(codes) = &level.codes else { panic!("no rows") };
+    let turned = (0..32).flat_map(|i| codes.row((i + 31) % 32)).collect();
+    level.codes = LevelCodes::Dense(FeatureRows::new(512, turned).expect("whole rows"));
+    let difference = relevancy_apart(&mut Seen::of(result, &camera), 0, "semantic_gaussians", "", &texts);
+    assert!(difference > 10.0 * TOLERANCE, "{difference}");
+}
+
+#[test]
 fn segments_of_thgs_answer_like_the_reference() {
     let texts = Texts::new();
     let mut seen = Seen::new("thgs");
@@ -255,9 +327,15 @@ fn segments_of_thgs_answer_like_the_reference() {
 #[test]
 fn every_language_has_a_mask_by_its_own_rule_and_by_the_common_one() {
     let texts = Texts::new();
-    for place in
-        ["langsplat/output", "langsplat_v2/output", "occams_lgs", "feature_3dgs/lseg_speedup", "legaussians/output"]
-    {
+    for place in [
+        "langsplat/output",
+        "langsplat_v2/output",
+        "occams_lgs",
+        "feature_3dgs/lseg_speedup",
+        "legaussians/output",
+        "gags",
+        "laga",
+    ] {
         let mut seen = Seen::new(place);
         let own = seen.scene.own_mask(&mut seen.renderer, &seen.view, texts.phrase()).expect(place);
         let fair = seen.scene.fair_mask(&mut seen.renderer, &seen.view, texts.phrase()).expect(place);
@@ -296,6 +374,13 @@ fn classes_and_clusters_become_a_semantic_map() {
     assert!(thgs.language.as_ref().is_some_and(|l| l.is_valid(&thgs.identities)));
     assert_eq!(thgs.identity_of[9], NO_IDENTITY);
     assert!(thgs.identities.iter().filter(|(_, i)| i.level == Level::Part).all(|(_, i)| i.parent != NO_IDENTITY));
+    let laga = map("laga").expect("clusters");
+    // Each half of its two large clusters is a part.
+    assert_eq!((laga.identities.count(Level::Object), laga.identities.count(Level::Part)), (2, 4));
+    let language = laga.language.as_ref().expect("embeddings");
+    assert!(language.is_valid(&laga.identities));
+    let counts: Vec<usize> = language.by_identity.iter().map(|of| of.raw.len()).collect();
+    assert_eq!(counts, [1, 2, 1, 2, 1, 2], "embeddings without a weight are none");
     let saga = map("saga").expect("objects");
     assert_eq!(saga.identity_of.len(), 32);
     assert!(matches!(map("langsplat/output"), Err(ForeignError::NoIdentities("LangSplat"))));
