@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use super::vectors::KnownVectors;
 use crate::io::IoError;
-use crate::io::results::{Method, MethodResult, ResultOptions, open_result};
+use crate::io::results::{Method, MethodKind, MethodResult, ResultOptions, open_result};
 use crate::io::trained::{self, SceneCamera};
 use crate::jobs::query::{QueryEngine, ViewMaps, seen_from};
 use crate::jobs::{JobError, Scene, open};
@@ -34,6 +34,37 @@ pub(crate) trait PhraseAnswers {
 
     /// The mask by the scene's own rule, if it has one.
     fn own_mask(&mut self, phrase: &str, vectors: &mut KnownVectors<'_>) -> Result<Option<ForeignMask>, JobError>;
+}
+
+/// A scene that is opened for questions once it is asked.
+#[derive(Clone, Debug)]
+pub(crate) enum AskedScene {
+    /// A scene with objects.
+    Own(Scene, Arc<SemanticMap>),
+    /// A result with embeddings.
+    Result(PathBuf),
+}
+
+impl AskedScene {
+    /// What can be asked of a scene with these objects; `None` if nothing can.
+    pub(crate) fn of(scene: &Scene, map: Option<&Arc<SemanticMap>>) -> Option<Self> {
+        let by_objects = || map.map(|map| Self::Own(scene.clone(), Arc::clone(map)));
+        match scene.method.map(Method::kind) {
+            Some(MethodKind::Embeddings | MethodKind::Clusters) => Some(Self::Result(scene.path.clone())),
+            Some(MethodKind::Classes | MethodKind::Affinities) | None => by_objects(),
+        }
+    }
+
+    /// Opens it.
+    ///
+    /// # Errors
+    /// If it cannot be read, or the encoder of its objects is not here.
+    pub(crate) fn open(&self) -> Result<CompareSubject, JobError> {
+        match self {
+            Self::Own(scene, map) => CompareSubject::own(scene.clone(), (**map).clone()),
+            Self::Result(path) => CompareSubject::open(path, &ResultOptions::default()),
+        }
+    }
 }
 
 /// A scene that is compared.

@@ -3,6 +3,7 @@
 //! An action changes the window at once, or starts a job and says what is done with its result ([`App::start`]).
 
 pub(super) mod camera_path;
+pub(super) mod comparing;
 pub(super) mod edit;
 pub(super) mod edits;
 pub(super) mod elsewhere;
