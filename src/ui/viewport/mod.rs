@@ -10,6 +10,7 @@ mod input;
 mod legend;
 mod marks;
 mod measured;
+mod numbers;
 mod outline;
 mod overlay;
 pub(crate) mod overrides;
