@@ -15,11 +15,20 @@ use crate::jobs::JobError;
 use crate::jobs::compare::answer::PhraseAnswer;
 use crate::jobs::compare::subject::{AskedScene, CompareSubject};
 use crate::jobs::compare::vectors::{InstalledEncoders, KnownVectors, TextFunction};
+use crate::pipeline::semantics::query::foreign::pointed::PointedPixel;
 use crate::pipeline::semantics::query::timing::ms_since;
 use crate::scene::Camera;
 
 /// Requests that may wait; only the newest is read.
 const QUEUED: usize = 16;
+
+/// What all scenes are asked.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) enum AskedOfAll {
+    Phrase(String),
+    /// What a pixel of the view belongs to.
+    Pixel(PointedPixel),
+}
 
 /// Request for the answers of all scenes.
 #[derive(Clone, Debug)]
@@ -27,14 +36,14 @@ pub(crate) struct CompareQuestion {
     /// Scenes in the order of their views; a scene whose generation changes is opened again.
     pub(crate) scenes: Vec<Versioned<AskedScene>>,
     pub(crate) camera: Camera,
-    pub(crate) phrase: String,
+    pub(crate) asks: AskedOfAll,
 }
 
 impl CompareQuestion {
     /// Returns whether both have the same answers.
     pub(crate) fn is_same(&self, other: &Self) -> bool {
         let generations = |q: &Self| q.scenes.iter().map(Versioned::generation).collect::<Vec<_>>();
-        self.phrase == other.phrase && self.camera == other.camera && generations(self) == generations(other)
+        self.asks == other.asks && self.camera == other.camera && generations(self) == generations(other)
     }
 }
 
@@ -143,7 +152,11 @@ fn answer(
         (known.looks_from, known.blend_ms) = (Some(question.camera.clone()), ms_since(start));
     }
     let size = (question.camera.width_px as usize, question.camera.height_px as usize);
-    let mut found = PhraseAnswer::of(scene, &question.phrase, size, vectors, 1).map_err(told)??;
+    let answered = match &question.asks {
+        AskedOfAll::Phrase(phrase) => PhraseAnswer::of(scene, phrase, size, vectors, 1),
+        AskedOfAll::Pixel(pixel) => PhraseAnswer::of_point(scene, *pixel, size),
+    };
+    let mut found = answered.map_err(told)??;
     found.ms.blend = known.blend_ms;
     Ok(found)
 }
@@ -175,15 +188,15 @@ mod tests {
         let scenes =
             vec![asked("langsplat/output"), asked("saga"), asked("no such folder"), asked("langsplat_v2/output")];
         let question = |phrase: &str| {
-            let (camera, phrase) = (camera.clone(), phrase.to_owned());
-            Arc::new(CompareQuestion { scenes: scenes.clone(), camera, phrase })
+            let (camera, asks) = (camera.clone(), AskedOfAll::Phrase(phrase.to_owned()));
+            Arc::new(CompareQuestion { scenes: scenes.clone(), camera, asks })
         };
         sender.send(question("an older one")).expect("room");
         sender.send(question("kettle")).expect("room");
         drop(sender);
         answer_all(&receiver, &mut encode, &slot, &repaint);
         let (_, found) = slot.newer_than(0).expect("answered");
-        assert_eq!(found.question.phrase, "kettle", "the newest alone is answered");
+        assert_eq!(found.question.asks, AskedOfAll::Phrase("kettle".into()), "the newest alone is answered");
         let of = |k: usize| found.answers[k].as_deref().expect("answered");
         let first = of(0).as_ref().expect("LangSplat answers");
         let wanted = |level: usize| expected(&format!("langsplat/expected/relevancy_pixels_{level}.npy"));
@@ -193,5 +206,22 @@ mod tests {
         assert!(of(1).as_ref().is_err_and(|why| why.contains("SAGA")), "{:?}", of(1).as_ref().err());
         assert!(of(2).as_ref().is_err_and(|why| why.contains("no such folder")));
         assert!(of(3).as_ref().is_ok_and(|a| a.ms.blend > 0.0 && a.raw != first.raw));
+    }
+
+    #[test]
+    fn a_pixel_is_asked_of_all_scenes() {
+        let camera = open::scene(&samples().join("saga")).expect("opens").cameras[0].camera.clone();
+        let mut encode = |_: &str, _: &[&str]| -> Result<Vec<Vec<f32>>, JobError> { Ok(Vec::new()) };
+        let (sender, receiver) = bounded(4);
+        let (slot, repaint): (Slot<ComparedAnswers>, Repaint) = (Slot::default(), Arc::new(|| {}));
+        let asks = AskedOfAll::Pixel(PointedPixel { at: [7, 6], scale: 0.5, threshold: 0.9 });
+        let scenes = vec![asked("saga"), asked("langsplat/output")];
+        sender.send(Arc::new(CompareQuestion { scenes, camera, asks })).expect("room");
+        drop(sender);
+        answer_all(&receiver, &mut encode, &slot, &repaint);
+        let (_, found) = slot.newer_than(0).expect("answered");
+        let of = |k: usize| found.answers[k].as_deref().expect("answered").as_ref();
+        assert!(of(0).is_ok_and(|a| a.mask().mask.contains(6 * 24 + 7)));
+        assert!(of(1).is_err_and(|why| why.contains("no classes or clusters")), "embeddings tell nothing of a pixel");
     }
 }

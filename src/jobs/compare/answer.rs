@@ -1,4 +1,5 @@
-//! Answer of a scene to a phrase in the view that it looks at: relevancy, and masks by its own rule and by the common one.
+//! Answer of a scene to a phrase or to a pixel of the view that it looks at: relevancy, and masks by its own rule and by
+//! the common one.
 
 use std::borrow::Cow;
 use std::path::Path;
@@ -12,6 +13,7 @@ use crate::math::stats::median;
 use crate::pipeline::semantics::evaluation::by_rule::{CutRule, PhraseInView};
 use crate::pipeline::semantics::query::foreign::ForeignError;
 use crate::pipeline::semantics::query::foreign::own_rules::ForeignMask;
+use crate::pipeline::semantics::query::foreign::pointed::PointedPixel;
 use crate::pipeline::semantics::query::timing::ms_since;
 use crate::pipeline::semantics::relevancy::on_lerfs_scale;
 use crate::pipeline::semantics::smoothing::largest;
@@ -54,6 +56,30 @@ impl PhraseAnswer {
         let level = answer.own.as_ref().map_or(common.level, |own| own.level).min(answer.levels.len() - 1);
         let raw = answer.levels.get(level).cloned().unwrap_or_default();
         Ok(Ok(Self { raw, own: answer.own, common, ms }))
+    }
+
+    /// Asks a scene what a pixel of its view belongs to.
+    ///
+    /// Returns the reason for which the scene has no answer, if it has none.
+    ///
+    /// # Errors
+    /// If the pixel cannot be asked for.
+    pub(crate) fn of_point(
+        scene: &mut CompareSubject,
+        pixel: PointedPixel,
+        size: (usize, usize),
+    ) -> Result<Result<Self, String>, JobError> {
+        let start = Instant::now();
+        let found = match scene.answers.pointed(pixel) {
+            Ok(Some(found)) => found,
+            Ok(None) => return Ok(Err("nothing is there".into())),
+            Err(e) => return problem(e).map(Err),
+        };
+        let ms = AnswerMs { decode: ms_since(start), ..AnswerMs::default() };
+        let raw = found.values.clone();
+        let common = PhraseInView { levels: vec![raw.clone()], own: None, size }.mask(CutRule::Common);
+        let common = common.unwrap_or_else(|| found.clone());
+        Ok(Ok(Self { raw, own: Some(found), common, ms }))
     }
 
     /// Returns the relevancy of the pixels on a scale.

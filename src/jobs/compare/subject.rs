@@ -12,11 +12,13 @@ use crate::jobs::{JobError, Scene, open};
 use crate::pipeline::semantics::evaluation::langsplat;
 use crate::pipeline::semantics::query::foreign::asked::{ForeignScene, ForeignView};
 use crate::pipeline::semantics::query::foreign::own_rules::ForeignMask;
+use crate::pipeline::semantics::query::foreign::pointed::PointedPixel;
 use crate::pipeline::semantics::query::foreign::{ForeignError, ForeignPhrase};
 use crate::pipeline::semantics::query::recipe::{QueryConfig, TEMPERATURE};
 use crate::pipeline::semantics::smoothing::{largest_level, peak};
+use crate::pipeline::semantics::view_map::ViewMap;
 use crate::render::{RenderSettings, Renderer};
-use crate::scene::{Camera, GaussianCloud, LevelFilter, SemanticMap};
+use crate::scene::{Camera, GaussianCloud, LevelFilter, Mask, NO_IDENTITY, SemanticMap};
 
 /// Own rule of this program in words.
 const BY_IDENTITY: &str = "pixels of the object or part that is the answer";
@@ -34,6 +36,9 @@ pub(crate) trait PhraseAnswers {
 
     /// The mask by the scene's own rule, if it has one.
     fn own_mask(&mut self, phrase: &str, vectors: &mut KnownVectors<'_>) -> Result<Option<ForeignMask>, JobError>;
+
+    /// The mask of what a pixel of the view belongs to; `None` where nothing is.
+    fn pointed(&mut self, pixel: PointedPixel) -> Result<Option<ForeignMask>, JobError>;
 }
 
 /// A scene that is opened for questions once it is asked.
@@ -51,7 +56,8 @@ impl AskedScene {
         let by_objects = || map.map(|map| Self::Own(scene.clone(), Arc::clone(map)));
         match scene.method.map(Method::kind) {
             Some(MethodKind::Embeddings | MethodKind::Clusters) => Some(Self::Result(scene.path.clone())),
-            Some(MethodKind::Classes | MethodKind::Affinities) | None => by_objects(),
+            Some(MethodKind::Affinities) => by_objects().or_else(|| Some(Self::Result(scene.path.clone()))),
+            Some(MethodKind::Classes) | None => by_objects(),
         }
     }
 
@@ -224,6 +230,11 @@ impl PhraseAnswers for ForeignAnswers {
             found => Ok(Some(found?)),
         }
     }
+
+    fn pointed(&mut self, pixel: PointedPixel) -> Result<Option<ForeignMask>, JobError> {
+        let Some(view) = &self.view else { return Ok(None) };
+        Ok(self.scene.pointed(view, pixel)?)
+    }
 }
 
 /// A scene of this program with the maps of its view.
@@ -262,5 +273,26 @@ impl PhraseAnswers for OwnAnswers {
         let level = largest_level(&levels).unwrap_or(0);
         let peak = peak(&values).filter(|at| values[*at] > 0.0);
         Ok(Some(ForeignMask { mask, level, values, peak, rule: BY_IDENTITY }))
+    }
+
+    fn pointed(
+        &mut self,
+        PointedPixel { at: [x, y], scale, .. }: PointedPixel,
+    ) -> Result<Option<ForeignMask>, JobError> {
+        let Some(maps) = &self.maps else { return Ok(None) };
+        let ViewMap { width_px, height_px, identity, .. } = &maps.identities;
+        let i = (x < *width_px && y < *height_px).then(|| y * width_px + x);
+        let Some((i, id)) = i.and_then(|i| Some((i, *identity.get(i)?))) else { return Ok(None) };
+        let all = &self.map.identities;
+        if all.get(id).is_none() {
+            return Ok(None);
+        }
+        // Details are the part, anything larger is the whole.
+        let whole = all.get(id).map(|of| of.parent).filter(|parent| *parent != NO_IDENTITY && scale >= 0.5);
+        let inside = all.descendants(whole.unwrap_or(id));
+        let is_in = |i: usize| inside.get(identity[i] as usize) == Some(&true);
+        let mask = Mask::from_fn(*width_px, *height_px, is_in);
+        let values = (0..identity.len()).map(|i| f32::from(u8::from(is_in(i)))).collect();
+        Ok(Some(ForeignMask { mask, level: usize::from(whole.is_some()), values, peak: Some(i), rule: BY_IDENTITY }))
     }
 }

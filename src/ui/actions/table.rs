@@ -239,6 +239,11 @@ macro_rules! action_table {
             CloseComparison(path: Option<PathBuf>): path.as_ref().map_or_else(|| "End the comparison".into(),
                     |p| format!("Close {}", p.display())), "Close what is shown beside this scene."
                 => comparing::close(app, path.as_deref());
+            ChooseImport: "Import as a scene\u{2026}",
+                "Make a scene of the open result of another method: its objects can be named, edited, removed and asked."
+                => import::choose_folder(app);
+            Import(folder: PathBuf): format!("Import into {}", folder.display()),
+                "Make a scene of the open result of another method." => import::run(app, folder);
             ChooseSheetFolder: "Save the comparison\u{2026}",
                 "Write table, pictures and page of what all scenes answer to the phrase, in the nearest photo's view."
                 => comparing::choose_sheet_folder(app);

@@ -69,6 +69,10 @@ pub(crate) fn top(ui: &mut Ui, cx: &mut Ctx<'_>, view: &Viewport) {
             item(ui, has_scene, None, Action::ExportPage, cx);
             item(ui, has_scene, None, Action::Screenshot, cx);
             ui.separator();
+            let is_result = state.scene.as_ref().is_some_and(|scene| scene.method.is_some());
+            if is_result {
+                item(ui, true, None, Action::ChooseImport, cx);
+            }
             item(ui, has_scene, None, Action::SaveCopy, cx);
             item(ui, has_scene, None, Action::ShowFolder(None), cx);
             item(ui, has_scene, None, Action::DeleteRemoved, cx);

@@ -1,6 +1,7 @@
 //! One pass of the viewport: its views, their frames, and all that is drawn over them.
 
 use egui::{Frame, Margin, Panel, Rect, Response, Sense, Ui};
+use glam::DVec2;
 
 use super::input::SteeredView;
 use super::marks::MarkedScene;
@@ -80,7 +81,14 @@ impl Viewport {
         let with_cameras = cx.layout.cameras && self.has_nothing_to_look_at() && !route.is_some_and(|r| r.plays);
         self.compared.keep_up(ui.ctx(), self.display.picture());
         let on_camera = self.show_frames(ui, &areas, &response, with_cameras, cx);
-        let picks = !takes_drags && !takes_clicks;
+        let asks_all = self.compared.is_on();
+        if asks_all && !takes_drags && !takes_clicks && response.clicked() && !on_camera {
+            let under = views.area_under_pointer(ui, shown, has_other);
+            let at = response.interact_pointer_pos().map(|pos| (pos - under.shown.min) / under.shown.size());
+            let point = at.and_then(|at| self.display.picked(DVec2::new(f64::from(at.x), f64::from(at.y)), &self.eye));
+            self.compared.point_at(point);
+        }
+        let picks = !takes_drags && !takes_clicks && !asks_all;
         if let Some(semantics) = state.semantics.as_ref().filter(|_| picks) {
             let under = views.area_under_pointer(ui, shown, has_other);
             let maps = self.queries.maps().map(|m| &***m).filter(|_| !on_camera && !under.is_other);

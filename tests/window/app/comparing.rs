@@ -114,3 +114,40 @@ fn a_result_with_embeddings_alone_is_asked_in_its_view() {
     w.harness.run_steps(2);
     assert!(!w.shows("Scale: "));
 }
+
+#[test]
+fn a_click_asks_what_a_point_belongs_to_and_a_result_becomes_a_scene() {
+    let folder = tempfile::tempdir().expect("folder");
+    let mut w = Window::new(Some(Action::Open(sample("saga", folder.path()))));
+    w.until("a picture", |a| a.viewport.picture().is_some_and(|p| p.full && p.median_depth.is_some()));
+    w.harness.run_steps(2);
+    assert!(w.shows("click a thing") && !w.shows("Threshold"));
+    // A pixel with a surface.
+    let view = w.harness.get_by_label("Viewport").rect();
+    let at = {
+        let picture = w.app().viewport.picture().expect("drawn");
+        let depth = picture.median_depth.as_ref().expect("depth");
+        let (wide, high) = (picture.camera.width_px as usize, picture.camera.height_px as usize);
+        let away = |i: &usize| ((i % wide) as f32 / wide as f32 - 0.5).hypot((i / wide) as f32 / high as f32 - 0.5);
+        let i =
+            (0..depth.len()).filter(|i| depth[*i] > 0.0).min_by(|a, b| away(a).total_cmp(&away(b))).expect("something");
+        let share = egui::vec2((i % wide) as f32 / wide as f32, (i / wide) as f32 / high as f32);
+        view.min + share * view.size()
+    };
+    w.harness.hover_at(at);
+    w.harness.step();
+    let (button, modifiers) = (egui::PointerButton::Primary, egui::Modifiers::NONE);
+    for pressed in [true, false] {
+        w.harness.event(egui::Event::PointerButton { pos: at, button, pressed, modifiers });
+        w.harness.step();
+    }
+    w.until("the mask of the point", |a| areas(a)[0].is_some_and(|area| area > 0));
+    assert!(w.shows("Threshold") && w.shows("Size"));
+    w.click("Ask the phrase again");
+    w.until("nothing is asked", |a| areas(a)[0].is_none());
+
+    let made = folder.path().join("made");
+    w.ask(Action::Import(made.clone()));
+    w.until("the scene", |a| a.state.scene.as_ref().is_some_and(|s| s.out == made));
+    assert!(made.join("scene.json").is_file() && w.app().state.scene.as_ref().is_some_and(|s| s.method.is_none()));
+}

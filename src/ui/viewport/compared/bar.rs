@@ -25,14 +25,21 @@ impl Compared {
     pub(in crate::ui::viewport) fn bar(&mut self, ui: &mut Ui, cx: &mut Ctx<'_>) {
         ui.horizontal_wrapped(|ui| {
             self.field(ui, cx.state.beside.len() + 1);
+            self.pointed(ui);
             self.scale(ui);
             self.rule(ui);
             let label = ui.label(RichText::new("Opacity").small()).id;
             ui.spacing_mut().slider_width = 70.0;
             let opacity = Slider::new(&mut self.choices.opacity, 0.0..=1.0).show_value(false);
             ui.add(opacity).on_hover_text("Opacity of relevancy").labelled_by(label);
-            if self.phrase().is_some() {
+            if self.asks() {
                 legend::bar(ui, COLORS, self.range().map(|v| format!("{v:.2}")));
+            }
+            if cx.state.scene.as_ref().is_some_and(|scene| scene.method.is_some()) && cx.state.beside.is_empty() {
+                ui.separator();
+                if ui.button("Import\u{2026}").on_hover_text(Action::ChooseImport.tooltip()).clicked() {
+                    cx.ask(Action::ChooseImport);
+                }
             }
             if !cx.state.beside.is_empty() {
                 ui.separator();
@@ -62,14 +69,46 @@ impl Compared {
             take_keyboard(ui.ctx(), id, &mut self.typed);
         }
         let hint = match scenes {
-            1 => "A phrase, e.g. \u{201c}red mug\u{201d}  ( / )".to_owned(),
-            _ => format!("A phrase for all {scenes} scenes  ( / )"),
+            1 => "A phrase ( / ), or click a thing".to_owned(),
+            _ => format!("A phrase for all {scenes} ( / ), or click a thing"),
         };
         let width = FIELD_PT.min(ui.available_width());
         let edit = TextEdit::singleline(&mut self.typed).id(id).hint_text(hint).char_limit(2_000).desired_width(width);
         let response = ui.add(edit).accessible_name("Phrase");
+        if response.changed() {
+            self.point_at(None);
+        }
         if response.has_focus() && ui.input(|i| i.key_pressed(Key::Escape)) {
             response.surrender_focus();
+        }
+    }
+
+    /// Draws what a click has chosen, and what it means.
+    fn pointed(&mut self, ui: &mut Ui) {
+        if self.point.is_none() {
+            return;
+        }
+        ui.label("or the point").on_hover_text("Clicked: what each scene says that it belongs to.");
+        ui.spacing_mut().slider_width = 70.0;
+        let mut slider = |ui: &mut Ui, name: &str, value: &mut f32, tip: &str| {
+            let label = ui.label(RichText::new(name).small()).id;
+            ui.add(Slider::new(value, 0.0..=1.0).fixed_decimals(2)).on_hover_text(tip).labelled_by(label);
+        };
+        slider(
+            ui,
+            "Size",
+            &mut self.choices.size,
+            "From details (a part) to the largest things (an object), where a scene has both.",
+        );
+        slider(
+            ui,
+            "Threshold",
+            &mut self.choices.threshold,
+            "Score from which a pixel belongs to the point, where a method has scores (SAGA).",
+        );
+        let leave = ui.button("\u{d7}").on_hover_text("Ask the phrase again");
+        if leave.accessible_name("Ask the phrase again").clicked() {
+            self.point_at(None);
         }
     }
 

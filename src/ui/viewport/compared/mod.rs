@@ -1,4 +1,4 @@
-//! One phrase asked of all scenes on screen: relevancy on one scale in every view, with the mask by each method's own
+//! One phrase, or one point, asked of all scenes on screen: relevancy on one scale in every view, with the mask by each method's own
 //! rule or by one rule for all. A result that knows embeddings but no objects is asked this way alone, too.
 
 mod bar;
@@ -6,7 +6,8 @@ mod painted;
 
 use std::sync::Arc;
 
-use egui::{RichText, Ui};
+use egui::{Color32, Pos2, RichText, Stroke, Ui};
+use glam::DVec3;
 
 use self::painted::PaintedAnswer;
 use super::split::ViewArea;
@@ -15,11 +16,12 @@ use crate::jobs::compare::cell::ShownRelevancy;
 use crate::jobs::compare::subject::AskedScene;
 use crate::math::colormap::Colormap;
 use crate::pipeline::semantics::query::foreign::own_rules::ForeignMask;
-use crate::scene::Mask;
+use crate::pipeline::semantics::query::foreign::pointed::PointedPixel;
+use crate::scene::{Camera, Mask};
 use crate::ui::state::AppState;
 use crate::ui::theme;
 use crate::worker::Versioned;
-use crate::worker::comparing::{CompareQuestion, ComparedAnswer, ComparedAnswers, ComparisonThread};
+use crate::worker::comparing::{AskedOfAll, CompareQuestion, ComparedAnswer, ComparedAnswers, ComparisonThread};
 use crate::worker::view::ViewPicture;
 
 /// Longer side of the views that are asked, px.
@@ -32,6 +34,10 @@ struct ComparedChoices {
     /// True if masks are by the common rule, also where a method has its own.
     by_common_rule: bool,
     opacity: f32,
+    /// Scale of what a point means, from 0 (details) to 1 (the largest things).
+    size: f32,
+    /// Score of what is alike to a point, where a method has scores.
+    threshold: f32,
 }
 
 impl ComparedChoices {
@@ -43,7 +49,7 @@ impl ComparedChoices {
 
 impl Default for ComparedChoices {
     fn default() -> Self {
-        Self { scale: ShownRelevancy::Raw, by_common_rule: false, opacity: 0.75 }
+        Self { scale: ShownRelevancy::Raw, by_common_rule: false, opacity: 0.75, size: 0.5, threshold: 0.8 }
     }
 }
 
@@ -53,6 +59,8 @@ pub struct Compared {
     /// True if the scenes on screen can be asked.
     is_on: bool,
     typed: String,
+    /// Point on a surface that was clicked; it is asked in place of the phrase.
+    point: Option<DVec3>,
     /// Frames for which the field still takes the keyboard.
     focus: u8,
     choices: ComparedChoices,
@@ -84,7 +92,33 @@ impl Compared {
 
     /// Asks a phrase as if it had been typed.
     pub(crate) fn ask(&mut self, phrase: &str) {
-        self.typed = phrase.to_owned();
+        (self.typed, self.point) = (phrase.to_owned(), None);
+    }
+
+    /// Scale of what a point means, from 0 (details) to 1 (the largest things).
+    pub(crate) fn size(&self) -> f32 {
+        self.choices.size
+    }
+
+    /// Asks what a point on a surface belongs to; `None` asks the phrase again.
+    pub(super) fn point_at(&mut self, point: Option<DVec3>) {
+        self.point = point;
+    }
+
+    /// True if something is asked.
+    fn asks(&self) -> bool {
+        self.point.is_some() || self.phrase().is_some()
+    }
+
+    /// What is asked in the view of a camera; `None` if nothing is, or if the point is out of sight.
+    fn asked_in(&self, camera: &Camera) -> Option<AskedOfAll> {
+        let Some(point) = self.point else { return self.phrase().map(|text| AskedOfAll::Phrase(text.to_owned())) };
+        let at = camera.project(point)?;
+        let is_inside = |at: f64, side: u32| (0.0..f64::from(side)).contains(&at);
+        let is_in_view = is_inside(at.x, camera.width_px) && is_inside(at.y, camera.height_px);
+        let ComparedChoices { size, threshold, .. } = self.choices;
+        let pixel = || PointedPixel { at: [at.x as usize, at.y as usize], scale: size, threshold };
+        is_in_view.then(|| AskedOfAll::Pixel(pixel()))
     }
 
     /// The phrase in the field, if there is one.
@@ -119,18 +153,19 @@ impl Compared {
         if !self.is_on {
             return;
         }
-        let phrase = self.phrase().map(str::to_owned);
-        let (Some(phrase), Some(picture)) = (phrase, picture) else {
+        let Some(picture) = picture.filter(|_| self.asks()) else {
             (self.asked, self.answers) = (None, None);
             return;
         };
         if picture.full {
-            let question = CompareQuestion {
-                scenes: self.scenes.iter().flatten().cloned().collect(),
-                camera: picture.camera.limited_to(SIDE_PX),
-                phrase,
-            };
-            self.send(ctx, question);
+            let camera = picture.camera.limited_to(SIDE_PX);
+            match self.asked_in(&camera) {
+                Some(asks) => {
+                    let scenes = self.scenes.iter().flatten().cloned().collect();
+                    self.send(ctx, CompareQuestion { scenes, camera, asks });
+                }
+                None => (self.asked, self.answers) = (None, None),
+            }
         }
         let newer = self.thread.as_ref().and_then(|thread| thread.answers().newer_than(self.seen));
         if let Some((generation, answers)) = newer {
@@ -159,7 +194,10 @@ impl Compared {
 
     /// Answer of the scene in a view to the phrase in the field, if it has come.
     fn answer(&self, index: usize) -> Option<&Arc<ComparedAnswer>> {
-        let answers = self.answers.as_ref().filter(|answers| Some(&*answers.question.phrase) == self.phrase())?;
+        let (answers, asked) = (self.answers.as_ref()?, self.asked.as_ref()?);
+        if answers.question.asks != asked.asks {
+            return None;
+        }
         let place = self.scenes.iter().take(index).flatten().count();
         self.scenes.get(index)?.as_ref()?;
         answers.answers.get(place)?.as_ref()
@@ -173,7 +211,7 @@ impl Compared {
 
     /// True if an answer of a view is still to come.
     fn waits(&self, index: usize) -> bool {
-        self.phrase().is_some() && self.scenes.get(index).is_some_and(Option::is_some) && self.answer(index).is_none()
+        self.asks() && self.scenes.get(index).is_some_and(Option::is_some) && self.answer(index).is_none()
     }
 
     /// Least and largest relevancy of the legend: one range for all views.
@@ -183,7 +221,14 @@ impl Compared {
 
     /// Paints the answers over the views, unless the camera has moved since.
     pub(super) fn paint(&mut self, ui: &Ui, areas: &[ViewArea], picture: Option<&ViewPicture>) {
-        let Some(answers) = self.answers.clone().filter(|_| self.is_on) else { return };
+        if self.is_on {
+            self.paint_answers(ui, areas, picture);
+            areas.iter().for_each(|area| self.mark_point(ui, area, picture));
+        }
+    }
+
+    fn paint_answers(&mut self, ui: &Ui, areas: &[ViewArea], picture: Option<&ViewPicture>) {
+        let Some(answers) = self.answers.clone() else { return };
         let is_here = |picture: &ViewPicture| picture.camera.limited_to(SIDE_PX) == answers.question.camera;
         if !picture.is_some_and(is_here) {
             return;
@@ -198,9 +243,23 @@ impl Compared {
         }
     }
 
+    /// Marks the point in a view.
+    fn mark_point(&self, ui: &Ui, area: &ViewArea, picture: Option<&ViewPicture>) {
+        let at = self.point.zip(picture).and_then(|(point, picture)| {
+            let camera = &picture.camera;
+            let at = camera.project(point)?;
+            let share = egui::vec2(at.x as f32 / camera.width_px as f32, at.y as f32 / camera.height_px as f32);
+            let pos: Pos2 = area.shown.min + share * area.shown.size();
+            area.shown.contains(pos).then_some(pos)
+        });
+        let Some(at) = at else { return };
+        let painter = ui.painter_at(area.rect);
+        painter.circle(at, 5.0, theme::accent(), Stroke::new(2.0, Color32::WHITE));
+    }
+
     /// Figures of the answer in a view: a short line, and all of it; or why there is none.
     pub(super) fn figures(&self, index: usize, truth: Option<&Mask>) -> Option<AnswerFigures> {
-        if !self.is_on || self.phrase().is_none() {
+        if !self.is_on || !self.asks() {
             return None;
         }
         if self.waits(index) {

@@ -5,6 +5,7 @@ use std::sync::Arc;
 use super::asked::{ForeignScene, ForeignView};
 use super::blend::BlendedCodes;
 use super::click::ClickedFeature;
+use super::pointed::PointedPixel;
 use super::*;
 use crate::io::results::tests::{expected, sample};
 use crate::io::results::{LevelValues, MethodResult};
@@ -213,6 +214,37 @@ fn a_click_in_saga_scores_like_the_reference() {
     let turned = ClickedFeature::at(blended, 6, 7, gate.as_ref(), 0.5).expect("something is there");
     assert!(apart(&turned.gaussians(features), &wanted) > 10.0 * TOLERANCE, "the control: another pixel");
     assert_eq!(ClickedFeature::at(blended, 24, 0, gate.as_ref(), 0.5), None);
+}
+
+#[test]
+fn a_pixel_tells_what_it_belongs_to() {
+    let pixel = |at, scale| PointedPixel { at, scale, threshold: 0.9 };
+    // SAGA: what scores like the pixel.
+    let saga = Seen::new("saga");
+    let mask = |scale| saga.scene.pointed(&saga.view, pixel([7, 6], scale)).expect("affinities").expect("something");
+    let found = mask(0.5);
+    assert!(found.mask.contains(6 * 24 + 7) && found.values[6 * 24 + 7] > 1.0 - TOLERANCE);
+    assert!((0..found.values.len()).all(|i| found.mask.contains(i) == (found.values[i] >= 0.9)));
+    assert_ne!(found.values, mask(1.0).values, "the control: another scale");
+    assert_eq!(saga.scene.pointed(&saga.view, pixel([24, 0], 0.5)).expect("affinities"), None, "outside of the view");
+    // Gaussian Grouping: the pixels of its class.
+    let grouping = Seen::new("gaussian_grouping");
+    let classes = expected("gaussian_grouping/expected/classes_pixels.npy");
+    let i = classes.iter().position(|c| *c == 7.0).expect("seen");
+    let found = grouping.scene.pointed(&grouping.view, pixel([i % 24, i / 24], 0.5)).expect("classes").expect("one");
+    assert!((0..classes.len()).all(|k| found.mask.contains(k) == (classes[k] == 7.0)));
+    let nothing = classes.iter().position(|c| *c == 0.0).expect("background");
+    assert_eq!(
+        grouping.scene.pointed(&grouping.view, pixel([nothing % 24, nothing / 24], 0.5)).expect("classes"),
+        None
+    );
+    // THGS: levels by scale; embeddings alone tell nothing.
+    let thgs = Seen::new("thgs");
+    let at = |scale| thgs.scene.pointed(&thgs.view, pixel([12, 9], scale)).expect("clusters").map(|f| f.level);
+    assert_eq!([at(0.0), at(1.0)], [Some(0), Some(2)]);
+    let embeddings = Seen::new("langsplat/output");
+    let none = embeddings.scene.pointed(&embeddings.view, pixel([12, 9], 0.5));
+    assert!(matches!(none, Err(ForeignError::NoIdentities("LangSplat"))));
 }
 
 #[test]
