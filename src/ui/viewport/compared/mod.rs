@@ -134,6 +134,7 @@ impl Compared {
             let map = state.semantics.as_ref().map(|map| &**map);
             let first = AskedScene::of(&scene.scene, map).filter(|_| scene.remote.is_none());
             let first = first.map(|asked| Versioned::new(Arc::new(asked)));
+            self.point = self.point.filter(|_| self.made_of.0 == made_of.0);
             (self.scenes, self.made_of) = (vec![first], made_of);
         }
         self.scenes.truncate(1);
@@ -143,7 +144,8 @@ impl Compared {
         let is_alone = state.semantics.is_none() && self.scenes.first().is_some_and(Option::is_some);
         self.is_on = (has_other || is_alone) && !state.is_training();
         if !self.is_on {
-            (self.asked, self.answers) = (None, None);
+            // The thread's scenes give their memory back.
+            (self.asked, self.answers, self.thread, self.seen) = (None, None, None, 0);
             self.painted.clear();
         }
     }
@@ -198,8 +200,8 @@ impl Compared {
         if answers.question.asks != asked.asks {
             return None;
         }
-        let place = self.scenes.iter().take(index).flatten().count();
-        self.scenes.get(index)?.as_ref()?;
+        let generation = self.scenes.get(index)?.as_ref()?.generation();
+        let place = answers.question.scenes.iter().position(|scene| scene.generation() == generation)?;
         answers.answers.get(place)?.as_ref()
     }
 
@@ -216,7 +218,8 @@ impl Compared {
 
     /// Least and largest relevancy of the legend: one range for all views.
     fn range(&self) -> [f32; 2] {
-        if self.choices.scale == ShownRelevancy::Raw { self.raw_range } else { [0.0, 1.0] }
+        let [least, most] = self.raw_range;
+        if self.choices.scale == ShownRelevancy::Raw && least < most { [least, most] } else { [0.0, 1.0] }
     }
 
     /// Paints the answers over the views, unless the camera has moved since.
@@ -302,11 +305,10 @@ impl Compared {
     }
 }
 
-/// Least and largest of what is larger than 0; 0 to 1 if that is no range.
+/// Least and largest of what is larger than 0.
 fn range_of<'a>(values: impl Iterator<Item = &'a f32>) -> [f32; 2] {
     let shown = values.copied().filter(|v| *v > 0.0);
-    let range = shown.fold([f32::INFINITY, 0.0_f32], |[least, most], v| [least.min(v), most.max(v)]);
-    if range[0] < range[1] { range } else { [0.0, 1.0] }
+    shown.fold([f32::INFINITY, 0.0_f32], |[least, most], v| [least.min(v), most.max(v)])
 }
 
 /// Figures of an answer.
