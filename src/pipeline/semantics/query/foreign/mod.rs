@@ -4,7 +4,8 @@
 //! 2. [`blend`] renders the codes of a view; [`classes`] and [`click`] read classes and clicks from them.
 //! 3. [`asked`] holds a result with what is computed once, and gives relevancy of Gaussians and pixels.
 //! 4. [`own_rules`] makes masks as each method does, and one as this program does.
-//! 5. [`identities`] and [`affinity`] make a `SemanticMap` of what a method has: classes, clusters, alike features.
+//! 5. [`features`] gives codes and embeddings of Gaussians as rows.
+//! 6. [`identities`] and [`affinity`] make a `SemanticMap` of what a method has: classes, clusters, alike features.
 //!
 //! Embeddings of phrases come from the caller: [`Method::encoder`](crate::io::results::Method::encoder) names the
 //! encoder.
@@ -15,6 +16,7 @@ pub mod blend;
 pub mod classes;
 pub mod click;
 pub(crate) mod cosines;
+pub(crate) mod features;
 pub mod identities;
 pub mod own_rules;
 
