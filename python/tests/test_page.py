@@ -82,7 +82,7 @@ class FrameTest(unittest.TestCase):
         self.assertEqual((tag, read.open, read.text, read.is_nested), ("iframe", [], "", True))
         self.assertEqual((attributes["srcdoc"], attributes["title"]), (self.PAGE.html, HOSTILE))
         self.assertIn("420px", attributes["style"] or "")
-        self.assertEqual(attributes["sandbox"], "allow-scripts")
+        self.assertEqual(attributes["sandbox"], "allow-scripts allow-forms")
         # The control: the same text without escapes is read as something else.
         raw = Read(f'<iframe title="{HOSTILE}" srcdoc="{self.PAGE.html}"></iframe>')
         self.assertTrue(len(raw.elements) > 1 or not raw.is_nested)

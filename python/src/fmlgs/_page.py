@@ -68,9 +68,9 @@ class Page:
     def _repr_html_(self) -> str:
         if self.is_large:
             return notice(f"{self.title}: a page of {_megabytes(self.size)}, too large for a cell; scene.show() puts it beside")
-        # A frame of its own origin, which may run the page's script and nothing else.
+        # A frame of its own origin, which reaches nothing of the notebook. Its dialog is closed by a form.
         style = f"width: 100%; height: {self.height_px}px; border: 0"
-        flags = 'sandbox="allow-scripts" allow="clipboard-write; fullscreen" loading="lazy"'
+        flags = 'sandbox="allow-scripts allow-forms" allow="clipboard-write; fullscreen" loading="lazy"'
         return f'<iframe title="{escape(self.title)}" style="{style}" {flags} srcdoc="{escape(self.html)}"></iframe>'
 
 
