@@ -229,8 +229,9 @@ class FeaturesTest(unittest.TestCase):
             named = fmlgs.open_scene(run / "output", decoder=elsewhere)
             np.testing.assert_array_equal(named.features().codes, sample("langsplat/expected/codes_1"))
             elsewhere.write_bytes(elsewhere.read_bytes()[:1000])
-            with self.assertRaisesRegex(fmlgs.CommandError, "decoder.pth"):
+            with self.assertRaises(fmlgs.CommandError) as caught:
                 named.features()
+            self.assertIn("decoder.pth", caught.exception.stderr)
 
 
 class RelevancyTest(unittest.TestCase):
@@ -292,6 +293,10 @@ class RelevancyTest(unittest.TestCase):
         sure = (sample("scene/alpha_0").reshape(18, 24) > 0) & (np.abs(hot - 0.5) > 1e-2)
         assert found.own_mask is not None
         np.testing.assert_array_equal(found.own_mask[sure], hot[sure] >= 0.5)
+        # The control: a phrase that changes places with one that is nowhere more alike.
+        other = opened("legaussians/output").relevancy("object", 0, vectors=self.TEXTS[[1, 0, 2, 3, 4]])
+        assert other.own_mask is not None
+        self.assertFalse(other.own_mask[sure & (hot > 0.5)].any())
         camera = opened("saga").photos[0].camera
         found = opened("ludvig").relevancy("kettle", camera, vectors=self.TEXTS)
         self.assertLess(apart(found, sample("ludvig/expected/relevancy_pixels").reshape(18, 24)), TOLERANCE)
@@ -328,7 +333,7 @@ class RelevancyTest(unittest.TestCase):
             scene.relevancy("kettle", "nowhere", vectors=self.TEXTS)
         with self.assertRaisesRegex(fmlgs.CommandError, "SAGA.*fmlgs import"):
             opened("saga").relevancy("kettle")
-        with self.assertRaisesRegex(fmlgs.CommandError, "--vectors"):
+        with self.assertRaisesRegex(fmlgs.CommandError, "are for results of other methods"):
             fmlgs.open_scene(trained()).relevancy("box 1", vectors=self.TEXTS)
         with tempfile.TemporaryDirectory() as folder, mock.patch.dict(os.environ, FMLGS_MODELS=folder):
             with self.assertRaisesRegex(fmlgs.CommandError, "clip-vit-b16"):
