@@ -1,6 +1,7 @@
 //! Questions to results of other methods: a phrase becomes relevancy of Gaussians and pixels, and masks by the method's
 //! own rule and by the common one.
 
+use std::path::Path;
 use std::sync::Arc;
 use std::time::Instant;
 
@@ -10,6 +11,8 @@ use super::{JobError, Scene};
 use crate::io::results::{
     self, EmbeddedLevel, LevelCodes, LevelValues, Method, MethodKind, MethodResult, ResultOptions,
 };
+use crate::io::{IoError, files, npy};
+use crate::math::vector::unit;
 use crate::models::{self, ModelError, TextSource};
 use crate::pipeline::semantics::query::foreign::asked::ForeignScene;
 use crate::pipeline::semantics::query::foreign::own_rules::ForeignMask;
@@ -27,7 +30,11 @@ pub(crate) fn open(scene: &Scene, options: &ResultOptions) -> Result<ForeignScen
     Ok(ForeignScene::new(read(scene, options)?))
 }
 
-fn read(scene: &Scene, options: &ResultOptions) -> Result<Arc<MethodResult>, JobError> {
+/// Reads the result that a scene was read from.
+///
+/// # Errors
+/// If the scene is none, or it cannot be read exactly.
+pub(super) fn read(scene: &Scene, options: &ResultOptions) -> Result<Arc<MethodResult>, JobError> {
     match &scene.result {
         Some(result) if *options == ResultOptions::default() => Ok(Arc::clone(result)),
         _ => Ok(Arc::new(results::open_result(&scene.path, options)?)),
@@ -65,6 +72,35 @@ pub(crate) fn vectors<S: TextSource<Error = ModelError> + ?Sized>(
     let mut all = source.texts(&phrases).into_iter().collect::<Result<Vec<_>, _>>()?;
     let canonical = all.split_off(1.min(all.len()));
     let query = all.pop().ok_or(JobError::EmptyQuery)?;
+    Ok(PhraseVectors { query, canonical, encode_ms: ms_since(start) })
+}
+
+/// Reads the embeddings of a phrase and of the canonical ones from a NumPy array: a row for each, the phrase first.
+///
+/// # Errors
+/// If it is no array of two rows or more, or a row has no direction.
+pub(crate) fn stored_vectors(file: &Path) -> Result<PhraseVectors, JobError> {
+    let start = Instant::now();
+    let bytes = files::read(file, files::MAX_PICTURE_BYTES)?;
+    let array = npy::open(&bytes, file)?;
+    let bad = |reason: String| IoError::syntax(file, "npy", reason);
+    let expected = "expected [rows, numbers]: the phrase's embedding, and one for each canonical phrase";
+    let shape = || bad(format!("its shape is {:?}; {expected}", array.shape()));
+    let &[rows, dim] = array.shape() else { return Err(shape().into()) };
+    if rows < 2 || dim == 0 {
+        return Err(shape().into());
+    }
+    let (claimed, possible) = (rows.saturating_mul(dim), array.possible);
+    if claimed > possible {
+        return Err(IoError::Count { path: file.into(), what: "numbers".into(), claimed, possible }.into());
+    }
+    let values: Vec<f32> = array.values()?.into_iter().map(|v| v as f32).collect();
+    let one = |(i, row): (usize, &[f32])| {
+        unit(row).ok_or_else(|| bad(format!("row {i} is zero or not finite; each is the embedding of a phrase")))
+    };
+    let mut rows = values.chunks_exact(dim as usize).enumerate().map(one);
+    let query = rows.next().ok_or(JobError::EmptyQuery)??;
+    let canonical = rows.collect::<Result<Vec<_>, _>>()?;
     Ok(PhraseVectors { query, canonical, encode_ms: ms_since(start) })
 }
 
@@ -216,7 +252,7 @@ fn in_words(values: &LevelValues) -> String {
 mod tests {
     use super::*;
     use crate::io::results::tests::{expected, samples};
-    use crate::jobs::open as opening;
+    use crate::jobs::{export, open as opening};
 
     /// Vectors of the samples in place of an encoder's.
     fn given() -> PhraseVectors {
@@ -249,6 +285,30 @@ mod tests {
         assert_eq!(best.level, best.common.level);
         assert_eq!(level_of(&asked.result, "2").expect("there"), level_of(&asked.result, "Medium").expect("there"));
         assert!(level_of(&asked.result, "4").expect_err("none").to_string().contains("small, medium, large"));
+    }
+
+    #[test]
+    fn vectors_of_a_file_answer_like_those_of_an_encoder() {
+        let known = stored_vectors(&samples().join("scene/texts.npy")).expect("five phrases");
+        let given = given();
+        let near = |a: &[f32], b: &[f32]| a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-6);
+        assert!(near(&known.query, &given.query) && known.canonical.len() == 4);
+        assert!(known.canonical.iter().zip(&given.canonical).all(|(a, b)| near(a, b)));
+        assert!(!near(&known.query, &given.canonical[0]), "the control: another row");
+        let folder = tempfile::tempdir().expect("folder");
+        let file = folder.path().join("a.npy");
+        let refused = |shape: &[usize], values: &[f32]| {
+            export::npy_blocks(&file, shape, |_| values.to_vec()).expect("written");
+            stored_vectors(&file).expect_err("refused").to_string()
+        };
+        assert!(refused(&[3], &[1.0; 3]).contains("[3]"));
+        assert!(refused(&[1, 3], &[1.0; 3]).contains("canonical"), "a phrase alone");
+        let zero = refused(&[2, 2], &[1.0, 0.0, 0.0, 0.0]);
+        assert!(zero.contains("row 1") && zero.contains("a.npy"), "{zero}");
+        assert!(refused(&[2, 2], &[f32::NAN, 0.0, 1.0, 0.0]).contains("row 0"));
+        std::fs::write(&file, "no array").expect("written");
+        assert!(stored_vectors(&file).expect_err("no array").to_string().contains("npy"));
+        assert!(stored_vectors(&folder.path().join("b.npy")).is_err(), "missing");
     }
 
     #[test]

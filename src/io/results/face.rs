@@ -305,4 +305,31 @@ impl LevelValues {
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
+
+    /// Numbers of a Gaussian's code; `None` if Gaussians have numbers of clusters instead.
+    pub fn code_dim(&self) -> Option<usize> {
+        match self {
+            Self::Embedded(level) => Some(level.codes.dim()),
+            Self::Classes { features, .. } | Self::Affinity { features, .. } => Some(features.dim()),
+            Self::Clusters(_) => None,
+        }
+    }
+
+    /// Copies the code of Gaussian `i` into `out`, as the method stores it; leaves `out` as it is without codes.
+    pub fn copy_code(&self, i: usize, out: &mut [f32]) {
+        match self {
+            Self::Embedded(level) => level.codes.copy(i, 0, out),
+            Self::Classes { features, .. } | Self::Affinity { features, .. } => features.copy(i, 0, out),
+            Self::Clusters(_) => {}
+        }
+    }
+
+    /// Numbers of a Gaussian's embedding; `None` if the method knows no language.
+    pub fn embedding_dim(&self) -> Option<usize> {
+        match self {
+            Self::Embedded(level) => Some(level.decoder.outputs()),
+            Self::Clusters(level) => Some(level.features.dim()),
+            Self::Classes { .. } | Self::Affinity { .. } => None,
+        }
+    }
 }

@@ -7,7 +7,7 @@ use super::vectors::KnownVectors;
 use crate::io::IoError;
 use crate::io::results::{Method, MethodKind, MethodResult, ResultOptions, open_result};
 use crate::io::trained::{self, SceneCamera};
-use crate::jobs::query::{QueryEngine, ViewMaps, seen_from};
+use crate::jobs::query::{BY_IDENTITY, QueryEngine, ViewMaps, seen_from};
 use crate::jobs::{JobError, Scene, open};
 use crate::pipeline::semantics::evaluation::langsplat;
 use crate::pipeline::semantics::query::foreign::asked::{ForeignScene, ForeignView};
@@ -19,9 +19,6 @@ use crate::pipeline::semantics::smoothing::{largest_level, peak};
 use crate::pipeline::semantics::view_map::ViewMap;
 use crate::render::{RenderSettings, Renderer};
 use crate::scene::{Camera, GaussianCloud, LevelFilter, Mask, NO_IDENTITY, SemanticMap};
-
-/// Own rule of this program in words.
-const BY_IDENTITY: &str = "pixels of the object or part that is the answer";
 
 /// Answers of a scene to phrases.
 pub(crate) trait PhraseAnswers {

@@ -37,7 +37,12 @@ pub(crate) struct BlendSource<'a> {
     pub(crate) copy: &'a (dyn Fn(usize, usize, &mut [f32]) + Sync),
 }
 
-/// Factor of each Gaussian's code: one, or that which gives it unit length.
+/// Factor of a code: one, or that which gives it unit length.
+pub(crate) fn factor(level: &EmbeddedLevel, code: &[f32]) -> f32 {
+    if level.is_unit { 1.0 / (code.iter().map(|v| v * v).sum::<f32>().sqrt() + TINY) } else { 1.0 }
+}
+
+/// Factors of the codes of all Gaussians.
 fn factors(level: &EmbeddedLevel) -> Vec<f32> {
     let codes = &level.codes;
     if !level.is_unit {
@@ -46,7 +51,7 @@ fn factors(level: &EmbeddedLevel) -> Vec<f32> {
     let dim = codes.dim();
     let one = |own: &mut Vec<f32>, i: usize| {
         codes.copy(i, 0, own);
-        1.0 / (own.iter().map(|v| v * v).sum::<f32>().sqrt() + TINY)
+        factor(level, own)
     };
     (0..codes.len()).into_par_iter().with_min_len(GAUSSIANS_PER_TASK).map_init(|| vec![0.0; dim], one).collect()
 }

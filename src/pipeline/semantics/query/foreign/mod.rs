@@ -5,7 +5,8 @@
 //!    what a pixel belongs to.
 //! 3. [`asked`] holds a result with what is computed once, and gives relevancy of Gaussians and pixels.
 //! 4. [`own_rules`] makes masks as each method does, and one as this program does.
-//! 5. [`identities`] and [`affinity`] make a `SemanticMap` of what a method has: classes, clusters, alike features.
+//! 5. [`features`] gives codes and embeddings of Gaussians as rows.
+//! 6. [`identities`] and [`affinity`] make a `SemanticMap` of what a method has: classes, clusters, alike features.
 //!
 //! Embeddings of phrases come from the caller: [`Method::encoder`](crate::io::results::Method::encoder) names the
 //! encoder.
@@ -16,6 +17,7 @@ pub mod blend;
 pub mod classes;
 pub mod click;
 pub(crate) mod cosines;
+pub(crate) mod features;
 pub mod identities;
 pub mod own_rules;
 pub mod pointed;
