@@ -98,7 +98,7 @@ pub(crate) fn run(args: QueryArgs, quiet: bool) -> Result<(), CliError> {
     }
     if args.level.is_some() || args.out.is_some() || args.result.is_given() {
         let text = "are for results of other methods with language; this is none (--mask and --heat write files)";
-        return Err(CliError::Usage(format!("--level, --out, --decoder and --top-k {text}")));
+        return Err(CliError::Usage(format!("--level, --out, --decoder, --top-k and --encoder {text}")));
     }
     let map = scene.semantics()?;
     if let Some(list) = &args.phrases {

@@ -4,7 +4,9 @@
 //! [`subject`] opens what is compared and answers behind one trait, [`views`] chooses cameras and labels, [`vectors`]
 //! encodes phrases, [`cell`] is the result. [`protocol`] scores one scene by the protocols of the literature.
 
+mod answers;
 pub(crate) mod cell;
+mod classes;
 mod letters;
 pub(crate) mod protocol;
 mod sheet;
@@ -29,6 +31,7 @@ use super::{JobError, export};
 use crate::io::results::ResultOptions;
 use crate::math::format::things;
 use crate::math::stats::median;
+use crate::models::ModelError;
 use crate::pipeline::observer::{Observer, Ticker};
 use crate::pipeline::semantics::evaluation::by_rule::{CutRule, PhraseInView};
 use crate::pipeline::semantics::query::foreign::ForeignError;
@@ -259,10 +262,12 @@ fn problem(e: JobError) -> Result<String, JobError> {
     match e {
         JobError::Foreign(
             e @ (ForeignError::NoLanguage(_)
+            | ForeignError::NoClass { .. }
             | ForeignError::NoIdentities(_)
             | ForeignError::NoRule(_)
             | ForeignError::Dimension { .. }),
         ) => Ok(e.to_string()),
+        JobError::Model(e @ ModelError::NoKnownWord { .. }) => Ok(e.to_string()),
         e => Err(e),
     }
 }
