@@ -8,9 +8,7 @@ use std::time::Instant;
 use serde::Serialize;
 
 use super::{JobError, Scene};
-use crate::io::results::{
-    self, EmbeddedLevel, LevelCodes, LevelValues, Method, MethodKind, MethodResult, ResultOptions,
-};
+use crate::io::results::{self, EmbeddedLevel, LevelCodes, LevelValues, MethodKind, MethodResult, ResultOptions};
 use crate::io::{IoError, files, npy};
 use crate::math::vector::unit;
 use crate::models::{self, ModelError, TextSource};
@@ -49,12 +47,12 @@ pub(crate) struct PhraseVectors {
     pub(crate) encode_ms: f64,
 }
 
-/// Embeds a phrase by the encoder that a method was trained with.
+/// Embeds a phrase by the encoder that a result was trained with.
 ///
 /// # Errors
-/// If the method knows no language, or its encoder is not on this machine.
-pub(crate) fn encoded(method: Method, text: &str) -> Result<PhraseVectors, JobError> {
-    let name = method.encoder().ok_or(ForeignError::NoLanguage(method.name()))?;
+/// If the result knows no language, or its encoder is not on this machine.
+pub(crate) fn encoded(result: &MethodResult, text: &str) -> Result<PhraseVectors, JobError> {
+    let name = result.encoder.as_deref().ok_or(ForeignError::NoLanguage(result.method.name()))?;
     vectors(&mut *models::encoder(name)?, text)
 }
 
@@ -251,7 +249,7 @@ fn in_words(values: &LevelValues) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::io::results::tests::{expected, samples};
+    use crate::io::results::tests::{expected, sample, samples};
     use crate::jobs::{export, open as opening};
 
     /// Vectors of the samples in place of an encoder's.
@@ -313,7 +311,8 @@ mod tests {
 
     #[test]
     fn methods_without_language_and_wrong_vectors_are_refused() {
-        assert!(matches!(encoded(Method::Saga, "kettle"), Err(JobError::Foreign(ForeignError::NoLanguage("SAGA")))));
+        let saga = sample("saga");
+        assert!(matches!(encoded(&saga, "kettle"), Err(JobError::Foreign(ForeignError::NoLanguage("SAGA")))));
         let mut source = |_: &str| -> Result<Vec<f32>, ModelError> { Ok(vec![1.0, 0.0]) };
         assert!(matches!(vectors(&mut source, "  "), Err(JobError::EmptyQuery)));
         let short = vectors(&mut source, "kettle").expect("two numbers");
@@ -321,6 +320,12 @@ mod tests {
         let asked = open(&scene, &ResultOptions::default()).expect("reads");
         let refused = ask(&asked, &scene.cameras[0].camera, &short, None).expect_err("too short").to_string();
         assert!(refused.contains("2 numbers") && refused.contains("clip-vit-b16"), "{refused}");
+        // The encoder that is named is the one that encodes.
+        let named = ResultOptions { encoder: Some("demo".into()), ..ResultOptions::default() };
+        let asked = open(&scene, &named).expect("reads");
+        let by_demo = encoded(&asked.result, "kettle").expect("part of the program");
+        let refused = ask(&asked, &scene.cameras[0].camera, &by_demo, None).expect_err("narrower").to_string();
+        assert!(["demo", "128 numbers", "512", "--encoder"].iter().all(|word| refused.contains(word)), "{refused}");
     }
 
     #[test]

@@ -196,7 +196,7 @@ const LINES: &[(&str, &[&str], &str)] = &[
     ("segment s lamp {}", &["--keep x"], ""),
     ("eval s {}", RECIPE, "eval s --masks m --by names"),
     ("eval s {}", &["--protocol masks", "--query lamp"], "eval s --masks m --protocol spin-nerf --query lamp"),
-    ("eval s --depth {}", &["--decoder f"], "eval s --masks m --decoder f"),
+    ("eval s --depth {}", &["--decoder f", "--encoder e"], "eval s --masks m --decoder f --encoder e"),
     ("eval s --masks m {}", &["--keep-borders", "--query lamp", "--relevancy raw"], "eval s --masks m --pictures p"),
     ("eval s --masks m --protocol strokes {}", &["--by names", "--pictures p"], ""),
     ("eval s --masks m --protocol corrections {}", RECIPE, ""),

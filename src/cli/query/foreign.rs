@@ -5,7 +5,7 @@ use serde_json::{Value, json};
 use super::QueryArgs;
 use super::out::OutFiles;
 use crate::cli::{CliError, output, view};
-use crate::io::results::Method;
+use crate::io::results::{Method, MethodResult};
 use crate::jobs::ask_result::{self, ResultAnswer};
 use crate::jobs::{Scene, query, render};
 use crate::math::format::{count, things};
@@ -37,11 +37,11 @@ pub(super) fn run(args: &QueryArgs, scene: &Scene, method: Method) -> Result<(),
     let text = args.text.as_deref().unwrap_or_default();
     let camera = view::choose(args.camera.as_deref(), scene)?.limited_to(args.max_side);
     render::check_room(camera.width_px, camera.height_px)?;
+    let asked = ask_result::open(scene, &args.result.options())?;
     let vectors = match &args.vectors {
         Some(file) => ask_result::stored_vectors(file)?,
-        None => ask_result::encoded(method, text)?,
+        None => ask_result::encoded(&asked.result, text)?,
     };
-    let asked = ask_result::open(scene, &args.result.options())?;
     let level = args.level.as_deref().map(|wanted| ask_result::level_of(&asked.result, wanted)).transpose()?;
     let answer = ask_result::ask(&asked, &camera, &vectors, level)?;
     let empty = Mask::empty(camera.width_px as usize, camera.height_px as usize);
@@ -58,7 +58,7 @@ pub(super) fn run(args: &QueryArgs, scene: &Scene, method: Method) -> Result<(),
     }
     let names: Vec<&str> = asked.result.levels.iter().map(|level| level.name.as_str()).collect();
     match args.json {
-        true => output::print_json(&as_json(text, method, &names, &answer))?,
+        true => output::print_json(&as_json(text, &asked.result, &names, &answer))?,
         false => output::print(&in_words(method, &names, &answer))?,
     }
     if answer.common.mask.is_empty() && own.is_empty() {
@@ -68,12 +68,12 @@ pub(super) fn run(args: &QueryArgs, scene: &Scene, method: Method) -> Result<(),
     Ok(())
 }
 
-fn as_json(text: &str, method: Method, names: &[&str], answer: &ResultAnswer) -> Value {
+fn as_json(text: &str, result: &MethodResult, names: &[&str], answer: &ResultAnswer) -> Value {
     let mask = |m: &ForeignMask| json!({ "rule": m.rule, "level": names[m.level], "pixels": m.mask.area() });
     json!({
         "query": text,
-        "method": method.name(),
-        "encoder": method.encoder(),
+        "method": result.method.name(),
+        "encoder": result.encoder,
         "level": names[answer.level],
         "levels": names,
         "relevancy": answer.relevancy.iter().copied().fold(0.0, f32::max),

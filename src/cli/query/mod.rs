@@ -107,7 +107,7 @@ pub(crate) fn run(args: QueryArgs, quiet: bool) -> Result<(), CliError> {
     }
     if args.level.is_some() || args.vectors.is_some() || args.result.is_given() {
         let text = "are for results of other methods with language; this is none";
-        return Err(CliError::Usage(format!("--level, --vectors, --decoder and --top-k {text}")));
+        return Err(CliError::Usage(format!("--level, --vectors, --decoder, --top-k and --encoder {text}")));
     }
     let map = scene.semantics()?;
     if let Some(list) = &args.phrases {

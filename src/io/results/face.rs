@@ -1,6 +1,7 @@
 //! The common shape of other methods' results: Gaussians, and for each level the values from which a phrase, a click or
 //! a number is answered.
 
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -11,6 +12,7 @@ use super::sparse::SparseRows;
 use crate::io::trained::SceneCamera;
 use crate::io::{IoError, gs_output};
 use crate::scene::GaussianCloud;
+use crate::scene::identity::whole_names::key;
 
 /// Method that made a result.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, strum::VariantArray)]
@@ -91,7 +93,7 @@ impl Method {
         }
     }
 
-    /// Text encoder whose embeddings its values are compared with; `None` if it knows no language.
+    /// Text encoder of its authors; `None` if it knows no language.
     pub fn encoder(self) -> Option<&'static str> {
         match self {
             Self::GaussianGrouping | Self::OmniSeg3d | Self::Saga => None,
@@ -110,6 +112,9 @@ pub struct MethodResult {
     pub path: PathBuf,
     /// The Gaussians, without the properties that became values.
     pub cloud: Arc<GaussianCloud>,
+    /// Text encoder whose embeddings its values are compared with, by its name in the list of models; `None` if it knows
+    /// no language.
+    pub encoder: Option<String>,
     /// Cameras of the photos, if they lie beside it.
     pub cameras: Vec<SceneCamera>,
     /// Levels, in the order of their files.
@@ -213,6 +218,15 @@ pub struct Classifier {
     pub weight: FeatureRows,
     /// Bias of each class.
     pub bias: Vec<f32>,
+    /// Names of classes that have one.
+    pub names: BTreeMap<u32, String>,
+}
+
+impl Classifier {
+    /// The class of this name; letter case and articles in front do not count.
+    pub fn named(&self, name: &str) -> Option<u32> {
+        self.names.iter().find(|(_, own)| key(own) == key(name)).map(|(class, _)| *class)
+    }
 }
 
 /// Gaussians in groups.
@@ -287,7 +301,8 @@ impl MethodResult {
             }
         }
         let beside = gs_output::beside(splat).unwrap_or_default();
-        Ok(Self { method, path: splat.into(), cloud, cameras: beside.cameras, levels })
+        let encoder = method.encoder().map(str::to_owned);
+        Ok(Self { method, path: splat.into(), cloud, encoder, cameras: beside.cameras, levels })
     }
 }
 

@@ -5,6 +5,7 @@
 //! read exactly is refused with the reason.
 
 pub(in crate::io) mod autoencoder;
+mod class_names;
 mod decoder;
 mod face;
 mod faiss;

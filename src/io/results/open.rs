@@ -51,7 +51,7 @@ pub fn open_result(path: &Path, options: &ResultOptions) -> Result<MethodResult,
         let cause = std::io::ErrorKind::NotFound.into();
         return Err(IoError::Read { path: path.into(), cause });
     }
-    match place(path)? {
+    let result = match place(path)? {
         Some(ResultPlace::Thgs(file)) => thgs::read(&file),
         Some(ResultPlace::Saga(file)) => saga::read(&file),
         Some(ResultPlace::Splat(splat, features)) => match features {
@@ -69,6 +69,23 @@ pub fn open_result(path: &Path, options: &ResultOptions) -> Result<MethodResult,
             remedy: "known are Gaussian Grouping, Gaga, OmniSeg3D-GS, OpenGaussian, Feature 3DGS, SAGA, LEGaussians, \
                      LangSplat, LangSplatV2, Occam's LGS, Dr.Splat, THGS, ReLaGS, splat-distiller and LUDVIG",
         }),
+    }?;
+    with_encoder(result, options)
+}
+
+/// A result whose phrases are encoded by the encoder of the options, if they name one.
+///
+/// # Errors
+/// If it knows no language.
+fn with_encoder(result: MethodResult, options: &ResultOptions) -> Result<MethodResult, IoError> {
+    match (&options.encoder, &result.encoder) {
+        (Some(_), None) => Err(IoError::Unsupported {
+            what: format!("a text encoder for a result of {} (it knows no language)", result.method.name()),
+            path: result.path,
+            remedy: "leave out --encoder",
+        }),
+        (Some(name), Some(_)) => Ok(MethodResult { encoder: Some(name.clone()), ..result }),
+        (None, _) => Ok(result),
     }
 }
 

@@ -69,6 +69,42 @@ fn gaussian_grouping_has_its_features_and_its_classifier() {
     assert_ne!(bits(&features.to_vec()), bits(&turned), "the control");
 }
 
+/// A copy of Gaussian Grouping's sample in `folder` whose classes have names.
+pub(crate) fn with_class_names(folder: &Path, names: &str) -> PathBuf {
+    let to = folder.join("named");
+    copied(&samples().join("gaussian_grouping"), &to);
+    std::fs::write(to.join("point_cloud/iteration_30000/class_names.txt"), names).expect("written");
+    to
+}
+
+#[test]
+fn classes_of_gaussian_grouping_have_the_names_in_a_file() {
+    let folder = tempfile::tempdir().expect("folder");
+    let opened = open_result(&with_class_names(folder.path(), "7 kettle\n3 mug\n"), &ResultOptions::default());
+    let LevelValues::Classes { classifier, .. } = &opened.expect("opens").levels[0].values else { panic!("classes") };
+    let named = ["kettle", "the Kettle", "mug", "class 7", "lid"].map(|name| classifier.named(name));
+    assert_eq!(named, [Some(7), Some(7), Some(3), None, None]);
+    let LevelValues::Classes { classifier, .. } = &sample("gaussian_grouping").levels[0].values else {
+        panic!("no classes")
+    };
+    assert_eq!(classifier.named("kettle"), None, "the control");
+    let e = refused(&with_class_names(folder.path(), "7 kettle\n999 mug\n"));
+    assert!(e.contains("class_names.txt") && e.contains("line 2"), "{e}");
+}
+
+#[test]
+fn another_text_encoder_is_taken_where_there_is_a_language() {
+    let options = ResultOptions { encoder: Some("demo".into()), ..ResultOptions::default() };
+    for path in ["langsplat/output", "opengaussian", "feature_3dgs/lseg"] {
+        let other = open_result(&samples().join(path), &options).expect(path);
+        assert_eq!(other.encoder.as_deref(), Some("demo"), "{path}");
+        let usual = sample(path);
+        assert_eq!(usual.encoder.as_deref(), usual.method.encoder(), "the control");
+    }
+    let e = open_result(&samples().join("gaussian_grouping"), &options).expect_err("no language").to_string();
+    assert!(e.contains("Gaussian Grouping") && e.contains("--encoder"), "{e}");
+}
+
 #[test]
 fn omniseg3d_has_features_without_a_classifier() {
     let folder = tempfile::tempdir().expect("folder");

@@ -10,6 +10,7 @@ use super::subject::CompareSubject;
 use super::vectors::KnownVectors;
 use crate::jobs::{JobError, export};
 use crate::math::stats::median;
+use crate::models::ModelError;
 use crate::pipeline::semantics::evaluation::by_rule::{CutRule, PhraseInView};
 use crate::pipeline::semantics::query::foreign::ForeignError;
 use crate::pipeline::semantics::query::foreign::own_rules::ForeignMask;
@@ -144,10 +145,12 @@ fn problem(e: JobError) -> Result<String, JobError> {
     match e {
         JobError::Foreign(
             e @ (ForeignError::NoLanguage(_)
+            | ForeignError::NoClass { .. }
             | ForeignError::NoIdentities(_)
             | ForeignError::NoRule(_)
             | ForeignError::Dimension { .. }),
         ) => Ok(e.to_string()),
+        JobError::Model(e @ ModelError::NoKnownWord { .. }) => Ok(e.to_string()),
         e => Err(e),
     }
 }

@@ -6,7 +6,9 @@
 
 pub(crate) mod answer;
 pub(crate) mod cell;
+mod classes;
 mod letters;
+mod phrase_answers;
 pub(crate) mod protocol;
 mod sheet;
 pub(crate) mod subject;

@@ -3,6 +3,8 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+use super::classes::ClassAnswers;
+use super::phrase_answers::PhraseAnswers;
 use super::vectors::KnownVectors;
 use crate::io::IoError;
 use crate::io::results::{Method, MethodKind, MethodResult, ResultOptions, open_result};
@@ -20,23 +22,8 @@ use crate::pipeline::semantics::view_map::ViewMap;
 use crate::render::{RenderSettings, Renderer};
 use crate::scene::{Camera, GaussianCloud, LevelFilter, Mask, NO_IDENTITY, SemanticMap};
 
-/// Answers of a scene to phrases.
-pub(crate) trait PhraseAnswers {
-    /// Renders what phrases need of a view.
-    fn look(&mut self, camera: &Camera) -> Result<(), JobError>;
-
-    /// Encodes a phrase; returns the milliseconds that it takes.
-    fn encode(&mut self, phrase: &str, vectors: &mut KnownVectors<'_>) -> Result<f64, JobError>;
-
-    /// Relevancy of each level at each pixel of the view, row-major, 0 to 1.
-    fn levels(&mut self, phrase: &str, vectors: &mut KnownVectors<'_>) -> Result<Vec<Vec<f32>>, JobError>;
-
-    /// The mask by the scene's own rule, if it has one.
-    fn own_mask(&mut self, phrase: &str, vectors: &mut KnownVectors<'_>) -> Result<Option<ForeignMask>, JobError>;
-
-    /// The mask of what a pixel of the view belongs to; `None` where nothing is.
-    fn pointed(&mut self, pixel: PointedPixel) -> Result<Option<ForeignMask>, JobError>;
-}
+/// Options in the remedies of errors that are about an option, not about the files.
+const OF_OPTIONS: [&str; 2] = ["--decoder", "--encoder"];
 
 /// A scene that is opened for questions once it is asked.
 #[derive(Clone, Debug)]
@@ -93,6 +80,10 @@ impl CompareSubject {
     /// If it is neither, cannot be read, or is a scene without objects.
     pub(crate) fn open(path: &Path, options: &ResultOptions) -> Result<Self, JobError> {
         if is_own(path) {
+            if *options != ResultOptions::default() {
+                let text = "--decoder and --encoder are for results of other methods; this is a scene of this program";
+                return Err(JobError::Output(format!("{}: {text}", path.display())));
+            }
             let scene = open::scene(path)?;
             let map = scene.semantics()?;
             return Self::own(scene, map);
@@ -103,32 +94,38 @@ impl CompareSubject {
     /// Opens the result of another method; `None` if the path is none.
     ///
     /// # Errors
-    /// If only a file that can be named is missing.
+    /// If only a file that can be named is missing, or an encoder is named for a result without language.
     pub(crate) fn of_another_method(path: &Path, options: &ResultOptions) -> Result<Option<Self>, JobError> {
         if is_own(path) || !path.exists() {
             return Ok(None);
         }
         match open_result(path, options) {
             Ok(result) => Ok(Some(Self::of_result(result, path))),
-            Err(e @ IoError::Unsupported { remedy, .. }) if remedy.contains("--decoder") => Err(e.into()),
+            Err(e @ IoError::Unsupported { remedy, .. }) if OF_OPTIONS.iter().any(|o| remedy.contains(o)) => {
+                Err(e.into())
+            }
             Err(_) => Ok(None),
         }
     }
 
     /// The result of another method.
     pub(crate) fn of_result(result: MethodResult, path: &Path) -> Self {
-        let (method, cloud) = (result.method, result.cloud.clone());
-        let cameras = result.cameras.clone();
+        let (name, encoder) = (result.method.name().to_owned(), result.encoder.clone());
+        let (cameras, cloud) = (result.cameras.clone(), result.cloud.clone());
         let scene = ForeignScene::new(Arc::new(result));
+        let answers: Box<dyn PhraseAnswers> = match scene.has_named_classes() {
+            true => Box::new(ClassAnswers::new(scene)),
+            false => Box::new(ForeignAnswers { scene, renderer: Renderer::new(), view: None }),
+        };
         Self {
-            name: method.name().into(),
+            name,
             path: path.into(),
-            encoder: method.encoder().map(str::to_owned),
+            encoder,
             cameras,
             photos: None,
             settings: RenderSettings::of_mode(cloud.render_mode),
             cloud,
-            answers: Box::new(ForeignAnswers { method, scene, renderer: Renderer::new(), view: None }),
+            answers,
         }
     }
 
@@ -174,7 +171,6 @@ pub(crate) fn name_apart(scenes: &mut [CompareSubject]) {
 
 /// A result of another method with its view.
 struct ForeignAnswers {
-    method: Method,
     scene: ForeignScene,
     renderer: Renderer,
     view: Option<ForeignView>,
@@ -187,14 +183,18 @@ struct EncodedPhrase {
 }
 
 impl EncodedPhrase {
-    fn new(method: Method, phrase: &str, vectors: &mut KnownVectors<'_>) -> Result<Self, JobError> {
-        let encoder = method.encoder().ok_or(ForeignError::NoLanguage(method.name()))?;
+    fn new(result: &MethodResult, phrase: &str, vectors: &mut KnownVectors<'_>) -> Result<Self, JobError> {
+        let encoder = encoder_of(result)?;
         Ok(Self { query: vectors.get(encoder, phrase)?.0, canonical: vectors.canonical(encoder)? })
     }
 
     fn as_foreign(&self) -> ForeignPhrase<'_> {
         ForeignPhrase { query: &self.query, canonical: &self.canonical, temperature: TEMPERATURE }
     }
+}
+
+fn encoder_of(result: &MethodResult) -> Result<&str, ForeignError> {
+    result.encoder.as_deref().ok_or(ForeignError::NoLanguage(result.method.name()))
 }
 
 impl PhraseAnswers for ForeignAnswers {
@@ -204,13 +204,13 @@ impl PhraseAnswers for ForeignAnswers {
     }
 
     fn encode(&mut self, phrase: &str, vectors: &mut KnownVectors<'_>) -> Result<f64, JobError> {
-        let encoder = self.method.encoder().ok_or(ForeignError::NoLanguage(self.method.name()))?;
+        let encoder = encoder_of(&self.scene.result)?;
         vectors.canonical(encoder)?;
         Ok(vectors.get(encoder, phrase)?.1)
     }
 
     fn levels(&mut self, phrase: &str, vectors: &mut KnownVectors<'_>) -> Result<Vec<Vec<f32>>, JobError> {
-        let encoded = EncodedPhrase::new(self.method, phrase, vectors)?;
+        let encoded = EncodedPhrase::new(&self.scene.result, phrase, vectors)?;
         let Some(view) = &self.view else { return Ok(Vec::new()) };
         let one = |level| {
             let found = self.scene.pixel_relevancy(&mut self.renderer, view, level, encoded.as_foreign());
@@ -220,7 +220,7 @@ impl PhraseAnswers for ForeignAnswers {
     }
 
     fn own_mask(&mut self, phrase: &str, vectors: &mut KnownVectors<'_>) -> Result<Option<ForeignMask>, JobError> {
-        let encoded = EncodedPhrase::new(self.method, phrase, vectors)?;
+        let encoded = EncodedPhrase::new(&self.scene.result, phrase, vectors)?;
         let Some(view) = &self.view else { return Ok(None) };
         match self.scene.own_mask(&mut self.renderer, view, encoded.as_foreign()) {
             Err(ForeignError::NoRule(_)) => Ok(None),

@@ -103,7 +103,7 @@ impl ForeignScene {
         match phrases.iter().map(|p| p.len()).find(|have| *have != want) {
             None => Ok(()),
             Some(have) => {
-                let encoder = method.encoder().unwrap_or_default();
+                let encoder = self.result.encoder.clone().unwrap_or_default();
                 Err(ForeignError::Dimension { have, want, method: method.name(), encoder })
             }
         }

@@ -27,7 +27,9 @@ pub fn semantic_map(result: &MethodResult, scale: f32) -> Result<SemanticMap, Fo
             let found = classes::of_gaussians(classifier, features);
             // Class 0 is nothing.
             let of: Vec<Option<u32>> = found.iter().map(|f| (f.class > 0).then_some(f.class)).collect();
-            let mut numbered = Numbered::new(&of, |class| vec![format!("class {class}")]);
+            let own = |class| classifier.names.get(&class).cloned();
+            let mut numbered =
+                Numbered::new(&of, |class| own(class).into_iter().chain([format!("class {class}")]).collect());
             numbered.margin = found.iter().map(|f| f.margin).collect();
             Ok(numbered.map(&result.cloud, None))
         }
@@ -100,7 +102,7 @@ impl Known<'_> {
 }
 
 fn known<'a>(result: &'a MethodResult, clusters: &ClusterLevel) -> Known<'a> {
-    let encoder = result.method.encoder().unwrap_or_default();
+    let encoder = result.encoder.as_deref().unwrap_or_default();
     Known { encoder, dimension: clusters.features.dim(), by_identity: Vec::new() }
 }
 

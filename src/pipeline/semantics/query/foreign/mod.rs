@@ -5,11 +5,11 @@
 //!    what a pixel belongs to.
 //! 3. [`asked`] holds a result with what is computed once, and gives relevancy of Gaussians and pixels.
 //! 4. [`own_rules`] makes masks as each method does, and one as this program does.
-//! 5. [`features`] gives codes and embeddings of Gaussians as rows.
+//! 5. [`features`] gives codes and embeddings of Gaussians as rows, [`named_classes`] answers names of classes.
 //! 6. [`identities`] and [`affinity`] make a `SemanticMap` of what a method has: classes, clusters, alike features.
 //!
-//! Embeddings of phrases come from the caller: [`Method::encoder`](crate::io::results::Method::encoder) names the
-//! encoder.
+//! Embeddings of phrases come from the caller:
+//! [`MethodResult::encoder`](crate::io::results::MethodResult::encoder) names the encoder.
 
 pub mod affinity;
 pub mod asked;
@@ -19,6 +19,7 @@ pub mod click;
 pub(crate) mod cosines;
 pub(crate) mod features;
 pub mod identities;
+pub(crate) mod named_classes;
 pub mod own_rules;
 pub mod pointed;
 
@@ -46,12 +47,17 @@ pub enum ForeignError {
     Draw(#[from] DrawError),
     #[error("the result of {0} knows no language; name its objects, and ask for the names")]
     NoLanguage(&'static str),
+    #[error("{method} knows no language, and no class in its class_names.txt is called '{name}'")]
+    NoClass { method: &'static str, name: String },
     #[error("the result of {0} has no classes or clusters")]
     NoIdentities(&'static str),
     #[error("{0} has no rule of its own for masks of phrases")]
     NoRule(&'static str),
-    #[error("the phrase's embedding has {have} numbers, but {method} compares {want}; encode it with {encoder}")]
-    Dimension { have: usize, want: usize, method: &'static str, encoder: &'static str },
+    #[error(
+        "the phrase's embedding by {encoder} has {have} numbers, but {method} compares {want}; name the encoder that the \
+         result was trained with (--encoder)"
+    )]
+    Dimension { have: usize, want: usize, method: &'static str, encoder: String },
     #[error("there is no level {0}")]
     Level(usize),
 }

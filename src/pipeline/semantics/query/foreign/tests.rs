@@ -7,8 +7,8 @@ use super::blend::BlendedCodes;
 use super::click::ClickedFeature;
 use super::pointed::PointedPixel;
 use super::*;
-use crate::io::results::tests::{expected, sample};
-use crate::io::results::{LevelValues, MethodResult};
+use crate::io::results::tests::{expected, sample, with_class_names};
+use crate::io::results::{LevelValues, MethodResult, ResultOptions, open_result};
 use crate::render::Renderer;
 use crate::scene::{Level, NO_IDENTITY};
 
@@ -196,6 +196,32 @@ fn classes_of_gaussian_grouping_are_those_of_its_classifier() {
     let texts = Texts::new();
     let e = seen.scene.gaussian_relevancy(0, texts.phrase()).expect_err("no language").to_string();
     assert!(e.contains("Gaussian Grouping"), "{e}");
+}
+
+#[test]
+fn a_name_of_a_class_is_answered_by_the_class() {
+    let folder = tempfile::tempdir().expect("folder");
+    let path = with_class_names(folder.path(), "7 kettle\n3 mug\n");
+    let result = open_result(&path, &ResultOptions::default()).expect("opens");
+    let camera = result.cameras[0].camera.clone();
+    let seen = Seen::of(result, &camera);
+    assert!(seen.scene.has_named_classes() && !Seen::new("gaussian_grouping").scene.has_named_classes());
+    let alpha = &seen.view.blended(0).expect("blended").alpha;
+    let mut wanted = expected("gaussian_grouping/expected/probability_of_class_7_pixels.npy");
+    wanted.iter_mut().zip(alpha).filter(|(_, a)| **a == 0.0).for_each(|(w, _)| *w = 0.0);
+    let share = |name: &str| seen.scene.share_of_name(&seen.view, name);
+    assert!(apart(&share("the kettle").expect("a class"), &wanted) < TOLERANCE);
+    assert!(apart(&share("mug").expect("a class"), &wanted) > 0.1, "the control: another class");
+    let mask = seen.scene.mask_of_name(&seen.view, "kettle").expect("a class");
+    // A share within the tolerance of the threshold may fall on either side.
+    let sure = |w: f32| (w - 0.2).abs() > TOLERANCE;
+    assert!((0..wanted.len()).filter(|i| sure(wanted[*i])).all(|i| mask.mask.contains(i) == (wanted[i] > 0.2)));
+    assert!(mask.peak.is_some_and(|at| mask.mask.contains(at)));
+    let e = share("lid").expect_err("no class").to_string();
+    assert!(e.contains("'lid'") && e.contains("class_names.txt"), "{e}");
+    let map = identities::semantic_map(&seen.scene.result, identities::USUAL_SCALE).expect("classes");
+    let names: Vec<String> = map.identities.iter().map(|(id, _)| map.identities.name(id)).collect();
+    assert_eq!(names, ["mug", "kettle", "class 200"]);
 }
 
 #[test]
