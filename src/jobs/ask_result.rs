@@ -11,8 +11,8 @@ use crate::io::results::{
     self, EmbeddedLevel, LevelCodes, LevelValues, Method, MethodKind, MethodResult, ResultOptions,
 };
 use crate::models::{self, ModelError, TextSource};
-use crate::pipeline::semantics::query::foreign::asked::ForeignScene;
-use crate::pipeline::semantics::query::foreign::own_rules::ForeignMask;
+use crate::pipeline::semantics::query::foreign::asked::{ForeignScene, PhraseRelevancy};
+use crate::pipeline::semantics::query::foreign::own_rules::{ForeignMask, fair_mask};
 use crate::pipeline::semantics::query::foreign::{ForeignError, ForeignPhrase};
 use crate::pipeline::semantics::query::recipe::{LERFS_PHRASES, TEMPERATURE};
 use crate::pipeline::semantics::query::timing::ms_since;
@@ -114,11 +114,12 @@ pub(crate) fn ask(
     let view = scene.look(&mut renderer, camera)?;
     let view_ms = ms_since(start);
     let start = Instant::now();
-    let common = scene.fair_mask(&mut renderer, &view, phrase)?;
+    let PhraseRelevancy { shown, of_method } = scene.relevancy(&mut renderer, &view, phrase)?;
+    let common = fair_mask(&view, &shown)?;
     let level = level.unwrap_or(common.level);
-    let relevancy = scene.pixel_relevancy(&mut renderer, &view, level, phrase)?;
+    let relevancy = shown.into_iter().nth(level).ok_or(ForeignError::Level(level))?;
     let gaussians = scene.gaussian_relevancy(level, phrase)?;
-    let own = match scene.own_mask(&mut renderer, &view, phrase) {
+    let own = match scene.own_mask(&mut renderer, &view, phrase, &of_method) {
         Ok(mask) => Ok(mask),
         Err(e @ ForeignError::NoRule(_)) => Err(e.to_string()),
         Err(e) => return Err(e.into()),

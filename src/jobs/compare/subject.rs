@@ -10,7 +10,7 @@ use crate::io::trained::{self, SceneCamera};
 use crate::jobs::query::{QueryEngine, ViewMaps, seen_from};
 use crate::jobs::{JobError, Scene, open};
 use crate::pipeline::semantics::evaluation::langsplat;
-use crate::pipeline::semantics::query::foreign::asked::{ForeignScene, ForeignView};
+use crate::pipeline::semantics::query::foreign::asked::{ForeignScene, ForeignView, PhraseRelevancy};
 use crate::pipeline::semantics::query::foreign::own_rules::ForeignMask;
 use crate::pipeline::semantics::query::foreign::{ForeignError, ForeignPhrase};
 use crate::pipeline::semantics::query::recipe::{QueryConfig, TEMPERATURE};
@@ -94,7 +94,7 @@ impl CompareSubject {
             photos: None,
             settings: RenderSettings::of_mode(cloud.render_mode),
             cloud,
-            answers: Box::new(ForeignAnswers { method, scene, renderer: Renderer::new(), view: None }),
+            answers: Box::new(ForeignAnswers { method, scene, renderer: Renderer::new(), view: None, known: None }),
         }
     }
 
@@ -144,6 +144,8 @@ struct ForeignAnswers {
     scene: ForeignScene,
     renderer: Renderer,
     view: Option<ForeignView>,
+    /// The last phrase of the view, and its relevancy of each level as the method computes it.
+    known: Option<(String, Vec<Vec<f32>>)>,
 }
 
 /// A phrase with all vectors that it is compared by.
@@ -166,6 +168,7 @@ impl EncodedPhrase {
 impl PhraseAnswers for ForeignAnswers {
     fn look(&mut self, camera: &Camera) -> Result<(), JobError> {
         self.view = Some(self.scene.look(&mut self.renderer, camera)?);
+        self.known = None;
         Ok(())
     }
 
@@ -178,17 +181,20 @@ impl PhraseAnswers for ForeignAnswers {
     fn levels(&mut self, phrase: &str, vectors: &mut KnownVectors<'_>) -> Result<Vec<Vec<f32>>, JobError> {
         let encoded = EncodedPhrase::new(self.method, phrase, vectors)?;
         let Some(view) = &self.view else { return Ok(Vec::new()) };
-        let one = |level| {
-            let found = self.scene.pixel_relevancy(&mut self.renderer, view, level, encoded.as_foreign());
-            found.map_err(JobError::from)
-        };
-        (0..self.scene.result.levels.len()).map(one).collect()
+        let PhraseRelevancy { shown, of_method } =
+            self.scene.relevancy(&mut self.renderer, view, encoded.as_foreign())?;
+        self.known = Some((phrase.to_owned(), of_method));
+        Ok(shown)
     }
 
     fn own_mask(&mut self, phrase: &str, vectors: &mut KnownVectors<'_>) -> Result<Option<ForeignMask>, JobError> {
         let encoded = EncodedPhrase::new(self.method, phrase, vectors)?;
         let Some(view) = &self.view else { return Ok(None) };
-        match self.scene.own_mask(&mut self.renderer, view, encoded.as_foreign()) {
+        let of_method = match self.known.take_if(|(known, _)| known == phrase) {
+            Some((_, of_method)) => of_method,
+            None => self.scene.relevancy(&mut self.renderer, view, encoded.as_foreign())?.of_method,
+        };
+        match self.scene.own_mask(&mut self.renderer, view, encoded.as_foreign(), &of_method) {
             Err(ForeignError::NoRule(_)) => Ok(None),
             found => Ok(Some(found?)),
         }

@@ -1,7 +1,8 @@
 //! Foreign results: answers from the Gaussians of other methods, with their values in place of a `SemanticMap`.
 //!
 //! 1. [`cosines`] compares codes with phrases through their decoder.
-//! 2. [`blend`] renders the codes of a view; [`classes`] and [`click`] read classes and clicks from them.
+//! 2. [`blend`] renders the codes of a view, [`packed`] keeps LangSplatV2's; [`pieces`] turns cosines into relevancy.
+//!    [`classes`] and [`click`] read classes and clicks.
 //! 3. [`asked`] holds a result with what is computed once, and gives relevancy of Gaussians and pixels.
 //! 4. [`own_rules`] makes masks as each method does, and one as this program does.
 //! 5. [`identities`] and [`affinity`] make a `SemanticMap` of what a method has: classes, clusters, alike features.
@@ -17,6 +18,8 @@ pub mod click;
 pub(crate) mod cosines;
 pub mod identities;
 pub mod own_rules;
+pub(crate) mod packed;
+pub mod pieces;
 
 #[cfg(test)]
 mod tests;

@@ -44,12 +44,13 @@ impl ForeignMask {
 }
 
 impl ForeignScene {
-    /// The mask by the method's own rule.
+    /// The mask by the method's own rule; `of_method` is the relevancy of the phrase as the method computes it.
     pub fn own_mask(
         &self,
         renderer: &mut Renderer,
         view: &ForeignView,
         phrase: ForeignPhrase<'_>,
+        of_method: &[Vec<f32>],
     ) -> Result<ForeignMask, ForeignError> {
         let (w, h) = view.size();
         let method = self.result.method;
@@ -60,17 +61,15 @@ impl ForeignScene {
         let covered = |(mask, values), level, rule| ForeignMask { mask, level, values, peak: None, rule };
         match method {
             Method::LangSplat | Method::LangSplatV2 | Method::OccamsLgs => {
-                let each = |level| self.relevancy_of_method(renderer, view, level, phrase);
-                let levels = self.of_levels(each)?;
-                ForeignMask::of_level(by_smoothing(&levels, w, h), BY_SMOOTHING)
+                ForeignMask::of_level(by_smoothing(of_method, w, h), BY_SMOOTHING)
             }
             Method::LeGaussians => {
                 let phrase = ForeignPhrase { temperature: LEGAUSSIANS_TEMPERATURE, ..phrase };
-                let relevancy = self.relevancy_of_method(renderer, view, 0, phrase)?;
+                let relevancy = self.pixel_relevancy(renderer, view, 0, phrase)?.of_method;
                 Ok(threshold(relevancy, |r| r >= 0.5, "relevancy of 0.5 or more"))
             }
             Method::Feature3dgs => {
-                let relevancy = self.relevancy_of_method(renderer, view, 0, phrase)?;
+                let relevancy = of_method.first().cloned().ok_or(ForeignError::Level(0))?;
                 Ok(threshold(relevancy, |r| r > 0.5, "more alike to the phrase than to any canonical phrase"))
             }
             Method::OpenGaussian => {
@@ -96,27 +95,6 @@ impl ForeignScene {
             Method::GaussianGrouping | Method::OmniSeg3d | Method::Saga => Err(ForeignError::NoLanguage(method.name())),
             Method::SplatDistiller | Method::Ludvig => Err(ForeignError::NoRule(method.name())),
         }
-    }
-
-    /// The mask by this program's rule, the same for all methods: over a fifth of LERF's scale, at the level of the
-    /// largest relevancy.
-    pub fn fair_mask(
-        &self,
-        renderer: &mut Renderer,
-        view: &ForeignView,
-        phrase: ForeignPhrase<'_>,
-    ) -> Result<ForeignMask, ForeignError> {
-        let (w, h) = view.size();
-        let levels = self.of_levels(|level| self.pixel_relevancy(renderer, view, level, phrase))?;
-        ForeignMask::of_level(by_common_rule(&levels, w, h), BY_COMMON_RULE)
-    }
-
-    /// Relevancies of all levels, in order.
-    fn of_levels(
-        &self,
-        each: impl FnMut(usize) -> Result<Vec<f32>, ForeignError>,
-    ) -> Result<Vec<Vec<f32>>, ForeignError> {
-        (0..self.result.levels.len()).map(each).collect()
     }
 
     /// Pixels whose blended membership in the best segments of these levels is over a half.
@@ -153,6 +131,13 @@ impl ForeignScene {
         let is_in = |i: usize| all.iter().any(|(_, level, k)| clusters[*level].of[i] == Some(*k));
         (0..self.result.cloud.len()).map(is_in).collect()
     }
+}
+
+/// The mask by this program's rule, the same for all methods: over a fifth of LERF's scale, at the level of the largest
+/// relevancy; `shown` is the relevancy of the phrase, 0 where nothing is.
+pub fn fair_mask(view: &ForeignView, shown: &[Vec<f32>]) -> Result<ForeignMask, ForeignError> {
+    let (w, h) = view.size();
+    ForeignMask::of_level(by_common_rule(shown, w, h), BY_COMMON_RULE)
 }
 
 /// OpenGaussian's clusters of an answer: the best one, and of the ten best those near it that have a larger number in
