@@ -4,6 +4,7 @@ use std::f32::consts::TAU;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+use glam::DVec3;
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 
@@ -13,9 +14,10 @@ use crate::io::results::{
     Decoder, DecoderStep, EmbeddedLevel, FeatureRows, LevelCodes, LevelValues, LinearLayer, Method, MethodResult,
     ResultLevel, SparseRows,
 };
+use crate::io::trained::SceneCamera;
 use crate::math::vector::unit;
 use crate::pipeline::semantics::query::recipe::LERFS_PHRASES;
-use crate::scene::GaussianCloud;
+use crate::scene::{Camera, GaussianCloud};
 
 /// Things on the floor, and to a row.
 const THINGS: usize = 60;
@@ -35,6 +37,10 @@ const KEPT: usize = 4;
 const USUAL: usize = 6;
 /// Numbers of LangSplat's codes, and between the layers of its decoder.
 const LAYERS: [usize; 8] = [3, 16, 32, 64, 128, 256, 256, DIM];
+/// Angle around the middle, distance and height of the cameras. The floor and the things fill most of their pictures.
+const CAMERAS: [[f64; 3]; 3] = [[0.3, 9.0, 6.0], [2.4, 7.0, 5.0], [4.4, 10.0, 7.0]];
+/// Size of these pictures in px.
+const PICTURE: [u32; 2] = [1_008, 567];
 /// Place of the result in errors.
 const NOWHERE: &str = "made-up result";
 
@@ -111,7 +117,17 @@ fn result(method: Method, cloud: GaussianCloud, levels: Vec<EmbeddedLevel>) -> M
         values: LevelValues::Embedded(level),
     };
     let levels = LEVELS.into_iter().zip(levels).map(level).collect();
-    MethodResult { method, path: PathBuf::from(NOWHERE), cloud: Arc::clone(&cloud), cameras: Vec::new(), levels }
+    MethodResult { method, path: PathBuf::from(NOWHERE), cloud: Arc::clone(&cloud), cameras: cameras(), levels }
+}
+
+fn cameras() -> Vec<SceneCamera> {
+    let camera = |[angle, distance, height]: [f64; 3]| {
+        let eye = DVec3::new(distance * angle.cos(), -height, distance * angle.sin());
+        let target = DVec3::new(0.0, -0.4, 0.0);
+        let camera = Camera::look_at(eye, target, DVec3::NEG_Y, 0.8, PICTURE[0], PICTURE[1])?;
+        Some(SceneCamera { name: format!("{angle}"), camera, held_out: false })
+    };
+    CAMERAS.into_iter().filter_map(camera).collect()
 }
 
 /// Gaussians on a floor and on things, y downwards, half of them on each; and what each belongs to: a thing, or a tile of
@@ -157,7 +173,6 @@ fn weights(rng: &mut Pcg64Mcg, groups: &[usize], level: usize) -> Result<SparseR
 
 #[cfg(test)]
 mod tests {
-    use super::super::views_of;
     use super::*;
     use crate::pipeline::semantics::query::foreign::ForeignPhrase;
     use crate::pipeline::semantics::query::foreign::asked::ForeignScene;
@@ -179,10 +194,10 @@ mod tests {
     #[test]
     fn a_phrase_near_an_entry_finds_some_of_the_view() {
         let AskedResult { result, phrases } = lang_splat_v2(3_000, 3).expect("made");
-        let cameras = views_of(&result.cloud, 96, 54);
+        let camera = result.cameras[0].camera.limited_to(96);
         let scene = ForeignScene::new(Arc::new(result));
         let mut renderer = Renderer::new();
-        let view = scene.look(&mut renderer, &cameras[0]).expect("drawn");
+        let view = scene.look(&mut renderer, &camera).expect("drawn");
         let mut mask = |query: &[f32]| {
             let phrase = ForeignPhrase { query, canonical: &phrases.canonical, temperature: TEMPERATURE };
             let found = scene.relevancy(&mut renderer, &view, phrase).expect("answered");

@@ -125,11 +125,14 @@ mod tests {
     use std::sync::Arc;
 
     use super::super::made_up_results::{lang_splat, lang_splat_v2};
-    use super::super::views_of;
     use super::*;
 
+    fn small_cameras(result: &MethodResult) -> Vec<Camera> {
+        result.cameras.iter().map(|c| c.camera.limited_to(96)).collect()
+    }
+
     fn timed(made_up: AskedResult) -> Vec<StageSample> {
-        let cameras = views_of(&made_up.result.cloud, 96, 54);
+        let cameras = small_cameras(&made_up.result);
         let scene = ForeignScene::new(Arc::new(made_up.result));
         time("x", &scene, &cameras, &made_up.phrases, &mut || true).expect("answered")
     }
@@ -153,14 +156,14 @@ mod tests {
             let parts: f64 = samples.iter().filter(|s| s.stage.starts_with("phrase: ")).map(|s| s.median).sum();
             assert!(of("phrase") > 0.0 && parts > 0.0 && of("first view") > 0.0 && of("first view: memory") > 0.0);
             let decoded = of("first view: pixels that phrases decode");
-            assert!((5.0..100.0).contains(&decoded), "a part of the view is empty: {decoded}");
+            assert!((50.0..100.0).contains(&decoded), "a small part of the view is empty: {decoded}");
         }
     }
 
     #[test]
     fn nothing_is_asked_after_a_stop() {
         let made_up = lang_splat_v2(500, 7).expect("made");
-        let cameras = views_of(&made_up.result.cloud, 48, 27);
+        let cameras = small_cameras(&made_up.result);
         let scene = ForeignScene::new(Arc::new(made_up.result));
         let samples = time("x", &scene, &cameras, &made_up.phrases, &mut || false).expect("stopped");
         assert!(samples.len() == 3 && samples.iter().all(|s| s.stage.starts_with("first view")), "{samples:?}");
