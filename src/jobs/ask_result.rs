@@ -11,7 +11,7 @@ use crate::io::results::{
     self, EmbeddedLevel, LevelCodes, LevelValues, Method, MethodKind, MethodResult, ResultOptions,
 };
 use crate::models::{self, ModelError, TextSource};
-use crate::pipeline::semantics::query::foreign::asked::{ForeignScene, PhraseRelevancy};
+use crate::pipeline::semantics::query::foreign::asked::ForeignScene;
 use crate::pipeline::semantics::query::foreign::own_rules::{ForeignMask, fair_mask};
 use crate::pipeline::semantics::query::foreign::{ForeignError, ForeignPhrase};
 use crate::pipeline::semantics::query::recipe::{LERFS_PHRASES, TEMPERATURE};
@@ -114,16 +114,16 @@ pub(crate) fn ask(
     let view = scene.look(&mut renderer, camera)?;
     let view_ms = ms_since(start);
     let start = Instant::now();
-    let PhraseRelevancy { shown, of_method } = scene.relevancy(&mut renderer, &view, phrase)?;
-    let common = fair_mask(&view, &shown)?;
+    let all = scene.relevancy(&mut renderer, &view, phrase)?;
+    let common = fair_mask(&view, &all)?;
     let level = level.unwrap_or(common.level);
-    let relevancy = shown.into_iter().nth(level).ok_or(ForeignError::Level(level))?;
     let gaussians = scene.gaussian_relevancy(level, phrase)?;
-    let own = match scene.own_mask(&mut renderer, &view, phrase, &of_method) {
+    let own = match scene.own_mask(&mut renderer, &view, phrase, &all) {
         Ok(mask) => Ok(mask),
         Err(e @ ForeignError::NoRule(_)) => Err(e.to_string()),
         Err(e) => return Err(e.into()),
     };
+    let relevancy = all.into_iter().nth(level).ok_or(ForeignError::Level(level))?;
     let best = gaussians.iter().copied().enumerate().max_by(|a, b| a.1.total_cmp(&b.1).then(b.0.cmp(&a.0)));
     Ok(ResultAnswer {
         level,

@@ -251,7 +251,8 @@ fn answered(
         levels = answers.levels(phrase, vectors)?;
         decode.push(ms_since(start));
     }
-    Ok((levels, answers.own_mask(phrase, vectors)?, encode, median(&decode)))
+    let own = answers.own_mask(phrase, &levels, vectors)?;
+    Ok((levels, own, encode, median(&decode)))
 }
 
 /// Returns why a scene has no answer; other errors stay errors.

@@ -10,7 +10,7 @@ use crate::io::trained::{self, SceneCamera};
 use crate::jobs::query::{QueryEngine, ViewMaps, seen_from};
 use crate::jobs::{JobError, Scene, open};
 use crate::pipeline::semantics::evaluation::langsplat;
-use crate::pipeline::semantics::query::foreign::asked::{ForeignScene, ForeignView, PhraseRelevancy};
+use crate::pipeline::semantics::query::foreign::asked::{ForeignScene, ForeignView};
 use crate::pipeline::semantics::query::foreign::own_rules::ForeignMask;
 use crate::pipeline::semantics::query::foreign::{ForeignError, ForeignPhrase};
 use crate::pipeline::semantics::query::recipe::{QueryConfig, TEMPERATURE};
@@ -32,8 +32,13 @@ pub(crate) trait PhraseAnswers {
     /// Relevancy of each level at each pixel of the view, row-major, 0 to 1.
     fn levels(&mut self, phrase: &str, vectors: &mut KnownVectors<'_>) -> Result<Vec<Vec<f32>>, JobError>;
 
-    /// The mask by the scene's own rule, if it has one.
-    fn own_mask(&mut self, phrase: &str, vectors: &mut KnownVectors<'_>) -> Result<Option<ForeignMask>, JobError>;
+    /// The mask by the scene's own rule, if it has one, from the relevancy of [`Self::levels`].
+    fn own_mask(
+        &mut self,
+        phrase: &str,
+        levels: &[Vec<f32>],
+        vectors: &mut KnownVectors<'_>,
+    ) -> Result<Option<ForeignMask>, JobError>;
 }
 
 /// A scene that is compared.
@@ -94,7 +99,7 @@ impl CompareSubject {
             photos: None,
             settings: RenderSettings::of_mode(cloud.render_mode),
             cloud,
-            answers: Box::new(ForeignAnswers { method, scene, renderer: Renderer::new(), view: None, known: None }),
+            answers: Box::new(ForeignAnswers { method, scene, renderer: Renderer::new(), view: None }),
         }
     }
 
@@ -144,8 +149,6 @@ struct ForeignAnswers {
     scene: ForeignScene,
     renderer: Renderer,
     view: Option<ForeignView>,
-    /// The last phrase of the view, and its relevancy of each level as the method computes it.
-    known: Option<(String, Vec<Vec<f32>>)>,
 }
 
 /// A phrase with all vectors that it is compared by.
@@ -168,7 +171,6 @@ impl EncodedPhrase {
 impl PhraseAnswers for ForeignAnswers {
     fn look(&mut self, camera: &Camera) -> Result<(), JobError> {
         self.view = Some(self.scene.look(&mut self.renderer, camera)?);
-        self.known = None;
         Ok(())
     }
 
@@ -181,20 +183,18 @@ impl PhraseAnswers for ForeignAnswers {
     fn levels(&mut self, phrase: &str, vectors: &mut KnownVectors<'_>) -> Result<Vec<Vec<f32>>, JobError> {
         let encoded = EncodedPhrase::new(self.method, phrase, vectors)?;
         let Some(view) = &self.view else { return Ok(Vec::new()) };
-        let PhraseRelevancy { shown, of_method } =
-            self.scene.relevancy(&mut self.renderer, view, encoded.as_foreign())?;
-        self.known = Some((phrase.to_owned(), of_method));
-        Ok(shown)
+        Ok(self.scene.relevancy(&mut self.renderer, view, encoded.as_foreign())?)
     }
 
-    fn own_mask(&mut self, phrase: &str, vectors: &mut KnownVectors<'_>) -> Result<Option<ForeignMask>, JobError> {
+    fn own_mask(
+        &mut self,
+        phrase: &str,
+        levels: &[Vec<f32>],
+        vectors: &mut KnownVectors<'_>,
+    ) -> Result<Option<ForeignMask>, JobError> {
         let encoded = EncodedPhrase::new(self.method, phrase, vectors)?;
         let Some(view) = &self.view else { return Ok(None) };
-        let of_method = match self.known.take_if(|(known, _)| known == phrase) {
-            Some((_, of_method)) => of_method,
-            None => self.scene.relevancy(&mut self.renderer, view, encoded.as_foreign())?.of_method,
-        };
-        match self.scene.own_mask(&mut self.renderer, view, encoded.as_foreign(), &of_method) {
+        match self.scene.own_mask(&mut self.renderer, view, encoded.as_foreign(), levels) {
             Err(ForeignError::NoRule(_)) => Ok(None),
             found => Ok(Some(found?)),
         }
@@ -229,12 +229,16 @@ impl PhraseAnswers for OwnAnswers {
         Ok(langsplat::levels(&answered, &maps.identities, &self.map.identities).into())
     }
 
-    fn own_mask(&mut self, phrase: &str, _: &mut KnownVectors<'_>) -> Result<Option<ForeignMask>, JobError> {
+    fn own_mask(
+        &mut self,
+        phrase: &str,
+        levels: &[Vec<f32>],
+        _: &mut KnownVectors<'_>,
+    ) -> Result<Option<ForeignMask>, JobError> {
         let answered = self.engine.ask(&self.map, phrase, LevelFilter::Auto)?;
         let (Some(maps), Some(answered)) = (&self.maps, answered) else { return Ok(None) };
         let (mask, values) = (maps.of_answer(&self.map, &answered, 1), answered.heat(&maps.identities));
-        let levels = langsplat::levels(&answered, &maps.identities, &self.map.identities);
-        let level = largest_level(&levels).unwrap_or(0);
+        let level = largest_level(levels).unwrap_or(0);
         let peak = peak(&values).filter(|at| values[*at] > 0.0);
         Ok(Some(ForeignMask { mask, level, values, peak, rule: BY_IDENTITY }))
     }

@@ -201,7 +201,7 @@ mod tests {
         let mut mask = |query: &[f32]| {
             let phrase = ForeignPhrase { query, canonical: &phrases.canonical, temperature: TEMPERATURE };
             let found = scene.relevancy(&mut renderer, &view, phrase).expect("answered");
-            fair_mask(&view, &found.shown).expect("a level").mask
+            fair_mask(&view, &found).expect("a level").mask
         };
         let [first, second] = [mask(&phrases.queries[0]), mask(&phrases.queries[1])];
         assert!(!first.is_empty() && first.area() < 96 * 54 / 2, "{}", first.area());

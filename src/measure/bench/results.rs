@@ -91,12 +91,12 @@ pub(crate) fn time(
             let start = Instant::now();
             let found = scene.relevancy(&mut renderer, &view, phrase)?;
             let relevancy = ms_since(start);
-            let own = match scene.own_mask(&mut renderer, &view, phrase, &found.of_method) {
+            let own = match scene.own_mask(&mut renderer, &view, phrase, &found) {
                 Err(ForeignError::NoRule(_)) => None,
                 own => Some(own?),
             };
             let with_own = ms_since(start);
-            let common = fair_mask(&view, &found.shown)?;
+            let common = fair_mask(&view, &found)?;
             let whole = ms_since(start);
             std::hint::black_box((&own, &common));
             values.add("phrase", "ms", [whole]);

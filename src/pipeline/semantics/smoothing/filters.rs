@@ -1,8 +1,11 @@
 //! Filters of LangSplat's smoothing: the mean over a box, and the majority of a neighborhood. Both keep sums of columns,
 //! band by band of rows.
 
+use std::ops::Range;
+
 use rayon::prelude::*;
 
+use super::side_by_side;
 use crate::scene::Mask;
 
 /// Side of the box, px.
@@ -14,64 +17,110 @@ const BAND: usize = 96;
 /// Rows of a task of the majority.
 const ROWS: usize = 32;
 
-/// Largest mean of a level.
+/// Relevancy of the pixels of a level, and what stands where it is 0.
+#[derive(Clone, Copy)]
+pub(super) struct SmoothedLevel<'a> {
+    pub(super) relevancy: &'a [f32],
+    pub(super) of_nothing: f32,
+}
+
+/// Largest values of a level.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct MeanPeak {
+pub(super) struct SmoothedPeak {
+    /// Largest smoothed value.
+    pub(super) value: f32,
+    /// Largest mean of a window.
     pub(super) mean: f32,
-    /// Its pixel, the first of equal ones.
+    /// Pixel of that mean, the first of equal ones.
     pub(super) at: usize,
 }
 
-/// Returns the mean of each pixel and of the window around it (x-15..x+14, edges mirrored without repeating the outermost
-/// pixel), and the largest mean of a window.
-pub(super) fn smoothed(relevancy: &[f32], w: usize, h: usize) -> (Vec<f32>, MeanPeak) {
-    let mut out = vec![0.0; w * h];
-    let bands = out.par_chunks_mut((BAND * w).max(1)).enumerate();
-    let peaks: Vec<MeanPeak> = bands.map(|(band, out)| smooth_band(relevancy, [w, h], band * BAND, out)).collect();
-    let none = MeanPeak { mean: f32::NEG_INFINITY, at: 0 };
-    (out, peaks.into_iter().fold(none, |most, peak| if peak.mean > most.mean { peak } else { most }))
-}
+impl SmoothedPeak {
+    const NONE: Self = Self { value: f32::NEG_INFINITY, mean: f32::NEG_INFINITY, at: 0 };
 
-/// Smooths the rows from `first` on.
-fn smooth_band(relevancy: &[f32], [w, h]: [usize; 2], first: usize, out: &mut [f32]) -> MeanPeak {
-    let half = BOX / 2;
-    let row = |y: isize| {
-        let from = mirrored(y, h) * w;
-        &relevancy[from..from + w]
-    };
-    // Sums of columns over the rows of the window, with mirrored ones before and after.
-    let mut columns = vec![0.0_f64; w + BOX - 1];
-    let before: Vec<usize> = (0..half).map(|k| mirrored(k as isize - half as isize, w)).collect();
-    let after: Vec<usize> = (0..half - 1).map(|k| mirrored((w + k) as isize, w)).collect();
-    let mut peak = MeanPeak { mean: f32::NEG_INFINITY, at: first * w };
-    for (k, out) in out.chunks_exact_mut(w).enumerate() {
-        let (y, half_rows) = ((first + k) as isize, half as isize);
-        let own = &mut columns[half..half + w];
-        if k == 0 {
-            for dy in -half_rows..half_rows {
-                own.iter_mut().zip(row(y + dy)).for_each(|(sum, v)| *sum += f64::from(*v));
-            }
-        } else {
-            let (new, old) = (row(y + half_rows - 1), row(y - half_rows - 1));
-            own.iter_mut()
-                .zip(new.iter().zip(old))
-                .for_each(|(sum, (new, old))| *sum += f64::from(*new) - f64::from(*old));
-        }
-        before.iter().enumerate().for_each(|(k, from)| columns[k] = columns[half + from]);
-        after.iter().enumerate().for_each(|(k, from)| columns[half + w + k] = columns[half + from]);
-        let mut sum: f64 = columns[..BOX - 1].iter().sum();
-        let (pixels, mut last) = (row(y), 0.0);
-        for (x, (out, pixel)) in out.iter_mut().zip(pixels).enumerate() {
-            sum += columns[x + BOX - 1] - last;
-            last = columns[x];
-            let mean = (sum / (BOX * BOX) as f64) as f32;
-            *out = 0.5 * (mean + pixel);
-            if mean > peak.mean {
-                peak = MeanPeak { mean, at: (first + k) * w + x };
-            }
+    fn add(&mut self, other: Self) {
+        self.value = self.value.max(other.value);
+        if other.mean > self.mean {
+            (self.mean, self.at) = (other.mean, other.at);
         }
     }
-    peak
+}
+
+impl SmoothedLevel<'_> {
+    /// Smooths without keeping the values.
+    pub(super) fn peak(self, w: usize, h: usize) -> SmoothedPeak {
+        let band = |band: usize| {
+            let first = band * BAND;
+            let mut peak = SmoothedPeak::NONE;
+            self.smooth(first..h.min(first + BAND), [w, h], |y, line, means| {
+                let [mean, value] = [means, line].map(|v| side_by_side(v)[1]);
+                if mean > peak.mean {
+                    let x = means.iter().position(|m| *m == mean).unwrap_or(0);
+                    (peak.mean, peak.at) = (mean, y * w + x);
+                }
+                peak.value = peak.value.max(value);
+            });
+            peak
+        };
+        let count = if self.relevancy.is_empty() { 0 } else { h.div_ceil(BAND) };
+        let bands: Vec<SmoothedPeak> = (0..count).into_par_iter().map(band).collect();
+        bands.into_iter().fold(SmoothedPeak::NONE, |mut most, peak| {
+            most.add(peak);
+            most
+        })
+    }
+
+    /// Returns the mean of each pixel and of the window around it: x-15..x+14, edges mirrored without repeating the
+    /// outermost pixel.
+    pub(super) fn values(self, w: usize, h: usize) -> Vec<f32> {
+        let mut out = vec![0.0; w * h];
+        out.par_chunks_mut((BAND * w).max(1)).enumerate().for_each(|(band, out)| {
+            let first = band * BAND;
+            let rows = first..first + out.len() / w;
+            self.smooth(rows, [w, h], |y, line, _| out[(y - first) * w..(y - first + 1) * w].copy_from_slice(line));
+        });
+        out
+    }
+
+    /// Smooths rows; `each` gets a row's number, its values, and its means.
+    fn smooth(self, rows: Range<usize>, [w, h]: [usize; 2], mut each: impl FnMut(usize, &[f32], &[f32])) {
+        let half = BOX / 2;
+        let filled = |v: f32| if v == 0.0 { self.of_nothing } else { v };
+        let row = |y: isize| {
+            let from = mirrored(y, h) * w;
+            &self.relevancy[from..from + w]
+        };
+        // Sums of columns over the rows of the window, with mirrored ones before and after.
+        let mut columns = vec![0.0_f64; w + BOX - 1];
+        let before: Vec<usize> = (0..half).map(|k| mirrored(k as isize - half as isize, w)).collect();
+        let after: Vec<usize> = (0..half - 1).map(|k| mirrored((w + k) as isize, w)).collect();
+        let (mut line, mut means) = (vec![0.0; w], vec![0.0; w]);
+        for (number, y) in rows.enumerate() {
+            let (middle, half_rows) = (y as isize, half as isize);
+            let own = &mut columns[half..half + w];
+            if number == 0 {
+                for dy in -half_rows..half_rows {
+                    own.iter_mut().zip(row(middle + dy)).for_each(|(sum, v)| *sum += f64::from(filled(*v)));
+                }
+            } else {
+                let pairs = row(middle + half_rows - 1).iter().zip(row(middle - half_rows - 1));
+                let change = |(new, old): (&f32, &f32)| f64::from(filled(*new)) - f64::from(filled(*old));
+                own.iter_mut().zip(pairs).for_each(|(sum, pair)| *sum += change(pair));
+            }
+            before.iter().enumerate().for_each(|(k, from)| columns[k] = columns[half + from]);
+            after.iter().enumerate().for_each(|(k, from)| columns[half + w + k] = columns[half + from]);
+            let mut sum: f64 = columns[..BOX - 1].iter().sum();
+            let mut last = 0.0;
+            for (x, mean) in means.iter_mut().enumerate() {
+                sum += columns[x + BOX - 1] - last;
+                last = columns[x];
+                *mean = (sum / (BOX * BOX) as f64) as f32;
+            }
+            let pixels = row(middle).iter().zip(&means);
+            line.iter_mut().zip(pixels).for_each(|(out, (v, mean))| *out = 0.5 * (mean + filled(*v)));
+            each(y, &line, &means);
+        }
+    }
 }
 
 /// Index `i` of `n`, mirrored at both ends.
@@ -84,19 +133,22 @@ fn mirrored(i: isize, n: usize) -> usize {
 /// Pixels most of whose neighborhood of 7 x 7 px, as far as it is in the picture, is `inside`.
 pub(super) fn majority(w: usize, h: usize, inside: impl Fn(usize) -> bool + Sync) -> Mask {
     let around = |at: usize, n: usize| at.saturating_sub(MAJORITY)..(at + MAJORITY + 1).min(n);
-    let flags: Vec<u8> = (0..w * h).into_par_iter().with_min_len(1 << 14).map(|i| u8::from(inside(i))).collect();
     let widths: Vec<u8> = (0..w).map(|x| around(x, w).len() as u8).collect();
     let mut kept = vec![0_u8; w * h];
     kept.par_chunks_mut((ROWS * w).max(1)).enumerate().for_each(|(task, kept)| {
+        let (first, count) = (task * ROWS, kept.len() / w);
+        let (top, end) = (around(first, h).start, around(first + count - 1, h).end);
+        let flags: Vec<u8> = (top * w..end * w).map(|i| u8::from(inside(i))).collect();
         // Numbers of pixels in columns of the window; none outside of the picture.
         let mut columns = vec![0_u8; w + 2 * MAJORITY];
         for (k, kept) in kept.chunks_exact_mut(w).enumerate() {
-            let rows = around(task * ROWS + k, h);
+            let rows = around(first + k, h);
             let height = rows.len() as u8;
             let own = &mut columns[MAJORITY..MAJORITY + w];
             own.fill(0);
             for y in rows {
-                own.iter_mut().zip(&flags[y * w..(y + 1) * w]).for_each(|(count, flag)| *count += flag);
+                let flags = &flags[(y - top) * w..(y - top + 1) * w];
+                own.iter_mut().zip(flags).for_each(|(count, flag)| *count += flag);
             }
             for from in 0..=2 * MAJORITY {
                 kept.iter_mut().zip(&columns[from..]).for_each(|(count, column)| *count += column);
@@ -138,7 +190,9 @@ mod tests {
     fn sums_of_columns_are_the_plain_mean() {
         for size in SIZES {
             let v = picture(size);
-            let (values, peak) = smoothed(&v, size[0], size[1]);
+            let level = SmoothedLevel { relevancy: &v, of_nothing: 0.0 };
+            let (values, peak) = (level.values(size[0], size[1]), level.peak(size[0], size[1]));
+            assert_eq!(peak.value, values.iter().copied().fold(0.0, f32::max));
             let plain = |before: isize| -> Vec<f64> { (0..v.len()).map(|i| plain_mean(&v, size, i, before)).collect() };
             let apart = |means: &[f64]| {
                 let one = |i: usize| (f64::from(values[i]) - 0.5 * (means[i] + f64::from(v[i]))).abs();
@@ -152,7 +206,21 @@ mod tests {
                 assert!(apart(&plain(14)) > 1e-4, "the control: a window that lies one pixel further");
             }
         }
-        assert_eq!(smoothed(&[], 0, 0).0, [0.0_f32; 0]);
+        let nothing = SmoothedLevel { relevancy: &[], of_nothing: 0.0 };
+        assert_eq!((nothing.values(0, 0), nothing.peak(0, 9)), (Vec::new(), SmoothedPeak::NONE));
+    }
+
+    #[test]
+    fn what_is_nothing_is_filled_before_it_is_smoothed() {
+        let [w, h] = SIZES[1];
+        let bare: Vec<f32> = picture([w, h]).into_iter().map(|v| if v < 0.3 { 0.0 } else { v }).collect();
+        let filled: Vec<f32> = bare.iter().map(|v| if *v == 0.0 { 0.5 } else { *v }).collect();
+        let both = |relevancy: &[f32], of_nothing: f32| {
+            let level = SmoothedLevel { relevancy, of_nothing };
+            (level.values(w, h), level.peak(w, h))
+        };
+        assert_eq!(both(&bare, 0.5), both(&filled, 0.0));
+        assert_ne!(both(&bare, 0.0), both(&filled, 0.0), "the control: not filled");
     }
 
     #[test]

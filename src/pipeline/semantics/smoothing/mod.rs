@@ -8,7 +8,7 @@ mod filters;
 
 use rayon::prelude::*;
 
-use self::filters::{majority, smoothed};
+use self::filters::{SmoothedLevel, SmoothedPeak, majority};
 use super::relevancy::{LERFS_SHARE, on_lerfs_scale};
 use crate::scene::Mask;
 
@@ -37,10 +37,19 @@ pub(crate) struct LeveledMask {
 
 /// Cuts relevancy by LangSplat's rule; `None` without a level. The largest mean is pointed at.
 pub(crate) fn by_smoothing(levels: &[Vec<f32>], w: usize, h: usize) -> Option<LeveledMask> {
-    let (mut values, peaks): (Vec<_>, Vec<_>) = levels.par_iter().map(|r| smoothed(r, w, h)).unzip();
-    let level = largest_level(&values)?;
+    by_smoothing_filled(levels, &vec![0.0; levels.len()], w, h)
+}
+
+/// As [`by_smoothing`], with what stands in each level where relevancy is 0.
+pub(crate) fn by_smoothing_filled(levels: &[Vec<f32>], of_nothing: &[f32], w: usize, h: usize) -> Option<LeveledMask> {
+    let inputs = levels.iter().zip(of_nothing);
+    let inputs: Vec<SmoothedLevel<'_>> =
+        inputs.map(|(relevancy, of_nothing)| SmoothedLevel { relevancy, of_nothing: *of_nothing }).collect();
+    // Only one level is kept: memory that is written for the first time takes longer than another pass.
+    let peaks: Vec<SmoothedPeak> = inputs.par_iter().map(|level| level.peak(w, h)).collect();
+    let level = peak(&peaks.iter().map(|p| p.value).collect::<Vec<_>>())?;
     let by_mean = peak(&peaks.iter().map(|p| p.mean).collect::<Vec<_>>())?;
-    let mut values = values.swap_remove(level);
+    let mut values = inputs[level].values(w, h);
     normalize(&mut values);
     let mask = majority(w, h, |i| values[i] > CUT);
     Some(LeveledMask { mask, level, peak: Some(peaks[by_mean].at).filter(|at| *at < values.len()), values })
@@ -90,26 +99,35 @@ pub(crate) fn largest(v: &[f32]) -> f32 {
 
 /// The least and the largest value; infinities if there is none.
 fn range(v: &[f32]) -> [f32; 2] {
-    // Comparisons that leave NaN out, many side by side, for one alone would wait for itself at every step.
-    let lower = |a: f32, b: f32| if b < a { b } else { a };
-    let higher = |a: f32, b: f32| if b > a { b } else { a };
-    let of_part = |part: &[f32]| {
-        let (mut least, mut most) = ([f32::INFINITY; WIDE], [f32::NEG_INFINITY; WIDE]);
-        let (whole, rest) = part.as_chunks::<WIDE>();
-        for some in whole {
-            for k in 0..WIDE {
-                least[k] = lower(least[k], some[k]);
-                most[k] = higher(most[k], some[k]);
-            }
-        }
-        for v in rest {
-            least[0] = lower(least[0], *v);
-            most[0] = higher(most[0], *v);
-        }
-        [least.into_iter().fold(f32::INFINITY, lower), most.into_iter().fold(f32::NEG_INFINITY, higher)]
-    };
     let both = |a: [f32; 2], b: [f32; 2]| [lower(a[0], b[0]), higher(a[1], b[1])];
-    v.par_chunks(PART).map(of_part).reduce(|| [f32::INFINITY, f32::NEG_INFINITY], both)
+    v.par_chunks(PART).map(side_by_side).reduce(|| [f32::INFINITY, f32::NEG_INFINITY], both)
+}
+
+/// The range of a part. Values are compared many side by side, for one alone would wait for itself at every step.
+fn side_by_side(part: &[f32]) -> [f32; 2] {
+    let (mut least, mut most) = ([f32::INFINITY; WIDE], [f32::NEG_INFINITY; WIDE]);
+    let (whole, rest) = part.as_chunks::<WIDE>();
+    for some in whole {
+        for k in 0..WIDE {
+            least[k] = lower(least[k], some[k]);
+            most[k] = higher(most[k], some[k]);
+        }
+    }
+    for v in rest {
+        least[0] = lower(least[0], *v);
+        most[0] = higher(most[0], *v);
+    }
+    [least.into_iter().fold(f32::INFINITY, lower), most.into_iter().fold(f32::NEG_INFINITY, higher)]
+}
+
+/// The smaller number; the first if the second is NaN.
+fn lower(a: f32, b: f32) -> f32 {
+    if b < a { b } else { a }
+}
+
+/// The larger number; the first if the second is NaN.
+fn higher(a: f32, b: f32) -> f32 {
+    if b > a { b } else { a }
 }
 
 #[cfg(test)]

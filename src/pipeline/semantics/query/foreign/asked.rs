@@ -7,7 +7,7 @@ use rayon::prelude::*;
 use super::blend::{self, BlendedCodes, BlendedCosines};
 use super::cosines::CosineHead;
 use super::packed::PackedWeights;
-use super::pieces::{self, KnownCosines, PieceCosines, PixelRelevancy};
+use super::pieces::{self, KnownCosines, PieceCosines};
 use super::{ForeignError, ForeignPhrase};
 use crate::io::results::{ClusterLevel, LevelCodes, LevelValues, MethodResult, ResultLevel};
 use crate::math::vector::{dot, unit};
@@ -15,6 +15,8 @@ use crate::pipeline::semantics::relevancy::{nearest, score};
 use crate::render::{LabelWinner, RenderSettings, Renderer};
 use crate::scene::Camera;
 
+/// Relevancy of what is alike to nothing, as the methods compute it.
+const UNDECIDED: f32 = 0.5;
 /// Numbers of an embedding over which its blend is not kept.
 const WIDE: usize = 128;
 
@@ -45,15 +47,6 @@ pub struct ForeignView {
     /// Its camera.
     pub camera: Camera,
     pub(crate) levels: Vec<LevelView>,
-}
-
-/// Relevancy of a phrase at the pixels of a view, for each level, row-major, 0 to 1.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct PhraseRelevancy {
-    /// 0 where nothing is.
-    pub shown: Vec<Vec<f32>>,
-    /// With the relevancy that the methods compute where nothing is.
-    pub of_method: Vec<Vec<f32>>,
 }
 
 impl ForeignView {
@@ -231,21 +224,21 @@ impl ForeignScene {
         Ok(pieces::planes(&*self.compared(renderer, view, level, phrases)?))
     }
 
-    /// Relevancy of each pixel of a view: of its blended embedding, or of the cluster of largest weight.
+    /// Relevancy of each pixel of a view, 0 to 1: of its blended embedding, or of the cluster of largest weight. It is 0
+    /// where nothing is.
     pub fn pixel_relevancy(
         &self,
         renderer: &mut Renderer,
         view: &ForeignView,
         level: usize,
         phrase: ForeignPhrase<'_>,
-    ) -> Result<PixelRelevancy, ForeignError> {
+    ) -> Result<Vec<f32>, ForeignError> {
         if let (LevelValues::Clusters(clusters), Some(LevelView::Winners(winners))) =
             (&self.level(level)?.values, view.levels.get(level))
         {
             let relevancy = self.cluster_relevancy(clusters, phrase)?;
             let of = |w: &LabelWinner| w.label.checked_sub(1).and_then(|c| relevancy.get(c as usize)).copied();
-            let shown: Vec<f32> = winners.iter().map(|w| of(w).unwrap_or(0.0)).collect();
-            return Ok(PixelRelevancy { of_method: shown.clone(), shown });
+            return Ok(winners.iter().map(|w| of(w).unwrap_or(0.0)).collect());
         }
         let cosines = self.compared(renderer, view, level, &all_of(phrase))?;
         Ok(pieces::relevancy(&*cosines, phrase.temperature))
@@ -257,14 +250,25 @@ impl ForeignScene {
         renderer: &mut Renderer,
         view: &ForeignView,
         phrase: ForeignPhrase<'_>,
-    ) -> Result<PhraseRelevancy, ForeignError> {
-        let mut all = PhraseRelevancy::default();
-        for level in 0..self.result.levels.len() {
-            let PixelRelevancy { shown, of_method } = self.pixel_relevancy(renderer, view, level, phrase)?;
-            all.shown.push(shown);
-            all.of_method.push(of_method);
+    ) -> Result<Vec<Vec<f32>>, ForeignError> {
+        (0..self.result.levels.len()).map(|level| self.pixel_relevancy(renderer, view, level, phrase)).collect()
+    }
+
+    /// Relevancy that the methods compute where nothing is.
+    pub(crate) fn of_nothing(&self, view: &ForeignView, level: usize, phrase: ForeignPhrase<'_>) -> f32 {
+        match (view.levels.get(level), self.heads.get(level)) {
+            (Some(LevelView::Winners(_)), _) => 0.0,
+            (Some(LevelView::Blended(blended)), Some(Some(head))) => {
+                let compared = BlendedCosines::new(head, blended, head.directions(&all_of(phrase)));
+                match compared.of_nothing() {
+                    [query, canonical @ ..] if compared.of_nothing().iter().any(|c| *c != 0.0) => {
+                        score(query - nearest(canonical.iter().copied()), phrase.temperature)
+                    }
+                    _ => UNDECIDED,
+                }
+            }
+            _ => UNDECIDED,
         }
-        Ok(all)
     }
 }
 

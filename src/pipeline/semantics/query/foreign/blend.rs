@@ -162,6 +162,11 @@ impl<'a> BlendedCosines<'a> {
         let of_nothing = block.chunks_exact(BLOCK).map(|of_phrase| of_phrase[0]).collect();
         Self { head, blended, directions, of_nothing }
     }
+
+    /// Cosines of the code of zeros with each phrase.
+    pub(crate) fn of_nothing(&self) -> &[f32] {
+        &self.of_nothing
+    }
 }
 
 impl PieceCosines for BlendedCosines<'_> {

@@ -19,7 +19,7 @@ pub(crate) mod cosines;
 pub mod identities;
 pub mod own_rules;
 pub(crate) mod packed;
-pub mod pieces;
+pub(crate) mod pieces;
 
 #[cfg(test)]
 mod tests;

@@ -6,8 +6,6 @@ use crate::pipeline::semantics::relevancy::quick_score;
 
 /// Pixels of a piece.
 pub(crate) const PIECE: usize = 1 << 12;
-/// Relevancy of what is alike to nothing, as the methods compute it.
-const UNDECIDED: f32 = 0.5;
 /// Pixels that are scored side by side.
 const WIDE: usize = 16;
 
@@ -22,15 +20,6 @@ pub(crate) trait PieceCosines: Sync {
 
     /// Writes the cosines of a piece: of its pixel `k` with phrase `p` to `out[p * PIECE + k]`.
     fn of_piece(&self, piece: usize, out: &mut [f32]);
-}
-
-/// Relevancy of the pixels of a level, row-major, 0 to 1.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct PixelRelevancy {
-    /// 0 where nothing is.
-    pub shown: Vec<f32>,
-    /// With the relevancy that the methods compute where nothing is.
-    pub of_method: Vec<f32>,
 }
 
 /// Cosines that are there already, a plane for each phrase.
@@ -77,28 +66,27 @@ pub(crate) fn planes(source: &dyn PieceCosines) -> Vec<Vec<f32>> {
     (0..source.phrases()).map(plane).collect()
 }
 
-/// Relevancy of the first phrase; the others are the canonical ones.
-pub(crate) fn relevancy(source: &dyn PieceCosines, temperature: f32) -> PixelRelevancy {
-    let mut found = PixelRelevancy { shown: vec![0.0; source.pixels()], of_method: vec![0.0; source.pixels()] };
-    let PixelRelevancy { shown, of_method } = &mut found;
-    let pieces = shown.par_chunks_mut(PIECE).zip(of_method.par_chunks_mut(PIECE)).enumerate();
+/// Relevancy of the first phrase, row-major, more than 0 and at most 1; the other phrases are the canonical ones. It is 0
+/// where nothing is, and for what has no direction, and so cosines of 0 with all phrases.
+pub(crate) fn relevancy(source: &dyn PieceCosines, temperature: f32) -> Vec<f32> {
+    let mut found = vec![0.0; source.pixels()];
     let buffer = || vec![0.0; source.phrases() * PIECE];
-    pieces.for_each_init(buffer, |cosines, (piece, (shown, of_method))| {
+    found.par_chunks_mut(PIECE).enumerate().for_each_init(buffer, |cosines, (piece, found)| {
         source.of_piece(piece, cosines);
-        score_piece(cosines, temperature, shown, of_method);
+        score_piece(cosines, temperature, found);
         if let Some(alpha) = source.alpha() {
-            shown.iter_mut().zip(part(alpha, piece)).filter(|(_, a)| **a == 0.0).for_each(|(r, _)| *r = 0.0);
+            found.iter_mut().zip(part(alpha, piece)).filter(|(_, a)| **a == 0.0).for_each(|(r, _)| *r = 0.0);
         }
     });
     found
 }
 
-/// Turns cosines into relevancy. What has no direction, and so cosines of 0 with all phrases, is undecided.
+/// Turns cosines into relevancy.
 #[multiversion::multiversion(targets("x86_64+avx2+fma"))]
-fn score_piece(cosines: &[f32], temperature: f32, shown: &mut [f32], of_method: &mut [f32]) {
+fn score_piece(cosines: &[f32], temperature: f32, found: &mut [f32]) {
     let Some((query, canonical)) = cosines.split_at_checked(PIECE) else { return };
     let query = query.as_chunks::<WIDE>().0;
-    for (b, (shown, of_method)) in shown.chunks_mut(WIDE).zip(of_method.chunks_mut(WIDE)).enumerate() {
+    for (b, found) in found.chunks_mut(WIDE).enumerate() {
         let query = &query[b];
         let mut nearest = [if canonical.is_empty() { 0.0 } else { f32::NEG_INFINITY }; WIDE];
         let mut sizes: [f32; WIDE] = std::array::from_fn(|k| query[k].abs());
@@ -109,14 +97,12 @@ fn score_piece(cosines: &[f32], temperature: f32, shown: &mut [f32], of_method: 
                 sizes[k] += other[k].abs();
             }
         }
-        let mut pair = [[0.0; WIDE]; 2];
+        let mut scores = [0.0; WIDE];
         for k in 0..WIDE {
             let relevancy = quick_score(query[k] - nearest[k], temperature);
-            pair[0][k] = if sizes[k] == 0.0 { 0.0 } else { relevancy };
-            pair[1][k] = if sizes[k] == 0.0 { UNDECIDED } else { relevancy };
+            scores[k] = if sizes[k] == 0.0 { 0.0 } else { relevancy };
         }
-        shown.copy_from_slice(&pair[0][..shown.len()]);
-        of_method.copy_from_slice(&pair[1][..of_method.len()]);
+        found.copy_from_slice(&scores[..found.len()]);
     }
 }
 
@@ -142,14 +128,16 @@ mod tests {
                 let one = |i: usize| {
                     let [query, canonical @ ..] = &source.0[..] else { return 1.0 };
                     let plain = score(query[i] - nearest(canonical.iter().map(|c| c[i])), temperature);
-                    let wanted = if i % 10 == 0 { [0.0, 0.5] } else { [plain; 2] };
-                    (found.shown[i] - wanted[0]).abs().max((found.of_method[i] - wanted[1]).abs())
+                    (found[i] - if i % 10 == 0 { 0.0 } else { plain }).abs()
                 };
                 (0..source.pixels()).map(one).fold(0.0, f32::max)
             };
             assert!(apart(10.0) < 1e-6, "{phrases}: {}", apart(10.0));
             assert!(apart(10.5) > 1e-3, "the control: another temperature");
         }
-        assert_eq!(relevancy(&KnownCosines(vec![Vec::new()]), 10.0), PixelRelevancy::default());
+        assert!(relevancy(&KnownCosines(vec![Vec::new()]), 10.0).is_empty());
+        // What is there is never 0, however little relevant.
+        let far = KnownCosines(vec![vec![-1.0; 20], vec![1.0; 20]]);
+        assert!(relevancy(&far, 1e6).iter().all(|r| *r > 0.0 && *r < 1e-30));
     }
 }

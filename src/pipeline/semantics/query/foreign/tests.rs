@@ -64,14 +64,14 @@ impl Seen {
     }
 
     fn relevancy(&mut self, level: usize, phrase: ForeignPhrase<'_>) -> Vec<f32> {
-        self.scene.pixel_relevancy(&mut self.renderer, &self.view, level, phrase).expect("answered").shown
+        self.scene.pixel_relevancy(&mut self.renderer, &self.view, level, phrase).expect("answered")
     }
 
     /// The masks by the method's own rule and by the common one.
     fn masks(&mut self, phrase: ForeignPhrase<'_>) -> (Result<ForeignMask, ForeignError>, ForeignMask) {
         let found = self.scene.relevancy(&mut self.renderer, &self.view, phrase).expect("answered");
-        let own = self.scene.own_mask(&mut self.renderer, &self.view, phrase, &found.of_method);
-        (own, fair_mask(&self.view, &found.shown).expect("a level"))
+        let own = self.scene.own_mask(&mut self.renderer, &self.view, phrase, &found);
+        (own, fair_mask(&self.view, &found).expect("a level"))
     }
 
     /// Blended numbers of a level, drawn anew.
@@ -132,12 +132,12 @@ fn packed_weights_answer_like_the_blended_ones_of_the_sample() {
         let plain = relevancy(&BlendedCosines::new(&head, &blended, directions.clone()), 10.0);
         let found =
             seen.scene.pixel_relevancy(&mut seen.renderer, &seen.view, level, texts.phrase()).expect("answered");
-        let difference = apart(&found.shown, &plain.shown).max(apart(&found.of_method, &plain.of_method));
+        let difference = apart(&found, &plain);
         assert!(difference < 2e-5, "{level}: {difference}");
         blended.planes.rotate_left(1);
         let turned = PackedWeights::new(&head, &blended);
         let turned = relevancy(&turned.compared(&directions), 10.0);
-        let difference = apart(&turned.shown, &plain.shown);
+        let difference = apart(&turned, &plain);
         assert!(difference > 10.0 * TOLERANCE, "the control, entries exchanged: {difference}");
     }
 }
