@@ -13,7 +13,7 @@ use crate::io::{IoError, files, npy};
 use crate::math::vector::unit;
 use crate::models::{self, ModelError, TextSource};
 use crate::pipeline::semantics::query::foreign::asked::ForeignScene;
-use crate::pipeline::semantics::query::foreign::own_rules::ForeignMask;
+use crate::pipeline::semantics::query::foreign::own_rules::{ForeignMask, fair_mask};
 use crate::pipeline::semantics::query::foreign::{ForeignError, ForeignPhrase};
 use crate::pipeline::semantics::query::recipe::{LERFS_PHRASES, TEMPERATURE};
 use crate::pipeline::semantics::query::timing::ms_since;
@@ -148,15 +148,16 @@ pub(crate) fn ask(
     let view = scene.look(&mut renderer, camera)?;
     let view_ms = ms_since(start);
     let start = Instant::now();
-    let common = scene.fair_mask(&mut renderer, &view, phrase)?;
+    let all = scene.relevancy(&mut renderer, &view, phrase)?;
+    let common = fair_mask(&view, &all)?;
     let level = level.unwrap_or(common.level);
-    let relevancy = scene.pixel_relevancy(&mut renderer, &view, level, phrase)?;
     let gaussians = scene.gaussian_relevancy(level, phrase)?;
-    let own = match scene.own_mask(&mut renderer, &view, phrase) {
+    let own = match scene.own_mask(&mut renderer, &view, phrase, &all) {
         Ok(mask) => Ok(mask),
         Err(e @ ForeignError::NoRule(_)) => Err(e.to_string()),
         Err(e) => return Err(e.into()),
     };
+    let relevancy = all.into_iter().nth(level).ok_or(ForeignError::Level(level))?;
     let best = gaussians.iter().copied().enumerate().max_by(|a, b| a.1.total_cmp(&b.1).then(b.0.cmp(&a.0)));
     Ok(ResultAnswer {
         level,

@@ -273,7 +273,7 @@ mod tests {
             renderer,
             without_gpu: true,
             instead_of_gpu: None,
-            comparison: None,
+            others: Vec::new(),
             cost,
             levels: DetailLevels::default(),
             cut: None,

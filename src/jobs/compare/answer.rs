@@ -137,7 +137,8 @@ fn timed(
         decode.push(ms_since(start));
     }
     let ms = AnswerMs { encode, decode: median(&decode), ..AnswerMs::default() };
-    Ok((levels, answers.own_mask(phrase, vectors)?, ms))
+    let own = answers.own_mask(phrase, &levels, vectors)?;
+    Ok((levels, own, ms))
 }
 
 /// Returns why a scene has no answer; other errors stay errors.

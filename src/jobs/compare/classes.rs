@@ -38,7 +38,12 @@ impl PhraseAnswers for ClassAnswers {
         Ok(vec![self.scene.share_of_name(view, phrase)?])
     }
 
-    fn own_mask(&mut self, phrase: &str, _: &mut KnownVectors<'_>) -> Result<Option<ForeignMask>, JobError> {
+    fn own_mask(
+        &mut self,
+        phrase: &str,
+        _: &[Vec<f32>],
+        _: &mut KnownVectors<'_>,
+    ) -> Result<Option<ForeignMask>, JobError> {
         let Some(view) = &self.view else { return Ok(None) };
         Ok(Some(self.scene.mask_of_name(view, phrase)?))
     }

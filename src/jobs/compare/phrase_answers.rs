@@ -17,8 +17,13 @@ pub(crate) trait PhraseAnswers {
     /// Relevancy of each level at each pixel of the view, row-major, 0 to 1.
     fn levels(&mut self, phrase: &str, vectors: &mut KnownVectors<'_>) -> Result<Vec<Vec<f32>>, JobError>;
 
-    /// The mask by the scene's own rule, if it has one.
-    fn own_mask(&mut self, phrase: &str, vectors: &mut KnownVectors<'_>) -> Result<Option<ForeignMask>, JobError>;
+    /// The mask by the scene's own rule, if it has one, from the relevancy of [`Self::levels`].
+    fn own_mask(
+        &mut self,
+        phrase: &str,
+        levels: &[Vec<f32>],
+        vectors: &mut KnownVectors<'_>,
+    ) -> Result<Option<ForeignMask>, JobError>;
 
     /// The mask of what a pixel of the view belongs to; `None` where nothing is.
     fn pointed(&mut self, pixel: PointedPixel) -> Result<Option<ForeignMask>, JobError>;

@@ -212,17 +212,18 @@ impl PhraseAnswers for ForeignAnswers {
     fn levels(&mut self, phrase: &str, vectors: &mut KnownVectors<'_>) -> Result<Vec<Vec<f32>>, JobError> {
         let encoded = EncodedPhrase::new(&self.scene.result, phrase, vectors)?;
         let Some(view) = &self.view else { return Ok(Vec::new()) };
-        let one = |level| {
-            let found = self.scene.pixel_relevancy(&mut self.renderer, view, level, encoded.as_foreign());
-            found.map_err(JobError::from)
-        };
-        (0..self.scene.result.levels.len()).map(one).collect()
+        Ok(self.scene.relevancy(&mut self.renderer, view, encoded.as_foreign())?)
     }
 
-    fn own_mask(&mut self, phrase: &str, vectors: &mut KnownVectors<'_>) -> Result<Option<ForeignMask>, JobError> {
+    fn own_mask(
+        &mut self,
+        phrase: &str,
+        levels: &[Vec<f32>],
+        vectors: &mut KnownVectors<'_>,
+    ) -> Result<Option<ForeignMask>, JobError> {
         let encoded = EncodedPhrase::new(&self.scene.result, phrase, vectors)?;
         let Some(view) = &self.view else { return Ok(None) };
-        match self.scene.own_mask(&mut self.renderer, view, encoded.as_foreign()) {
+        match self.scene.own_mask(&mut self.renderer, view, encoded.as_foreign(), levels) {
             Err(ForeignError::NoRule(_)) => Ok(None),
             found => Ok(Some(found?)),
         }
@@ -262,12 +263,16 @@ impl PhraseAnswers for OwnAnswers {
         Ok(langsplat::levels(&answered, &maps.identities, &self.map.identities).into())
     }
 
-    fn own_mask(&mut self, phrase: &str, _: &mut KnownVectors<'_>) -> Result<Option<ForeignMask>, JobError> {
+    fn own_mask(
+        &mut self,
+        phrase: &str,
+        levels: &[Vec<f32>],
+        _: &mut KnownVectors<'_>,
+    ) -> Result<Option<ForeignMask>, JobError> {
         let answered = self.engine.ask(&self.map, phrase, LevelFilter::Auto)?;
         let (Some(maps), Some(answered)) = (&self.maps, answered) else { return Ok(None) };
         let (mask, values) = (maps.of_answer(&self.map, &answered, 1), answered.heat(&maps.identities));
-        let levels = langsplat::levels(&answered, &maps.identities, &self.map.identities);
-        let level = largest_level(&levels).unwrap_or(0);
+        let level = largest_level(levels).unwrap_or(0);
         let peak = peak(&values).filter(|at| values[*at] > 0.0);
         Ok(Some(ForeignMask { mask, level, values, peak, rule: BY_IDENTITY }))
     }

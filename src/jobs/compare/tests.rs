@@ -1,5 +1,6 @@
 //! Samples of other methods and a scene of this program side by side; vectors of phrases come with the samples.
 
+use std::path::Path;
 use std::sync::Arc;
 
 use glam::DVec3;
@@ -10,9 +11,11 @@ use super::views::WantedViews;
 use super::*;
 use crate::io::results::tests::{expected, sample, samples, with_class_names};
 use crate::io::trained::SceneCamera;
-use crate::jobs::Scene;
 use crate::jobs::evaluate_masks::Protocol;
+use crate::jobs::{Scene, export};
 use crate::pipeline::observer::Silent;
+use crate::pipeline::semantics::evaluation::by_rule::{CutRule, PhraseInView};
+use crate::pipeline::semantics::query::foreign::own_rules::ForeignMask;
 use crate::scene::{Camera, GaussianCloud, Identities, Level, Mask, NO_IDENTITY, SemanticMap};
 
 /// Vectors of the samples: the phrase's, and those of the canonical ones.

@@ -12,7 +12,7 @@ use crate::jobs::go_to::{self, ApproachRequest, Approached};
 use crate::navigate::FRAMES;
 use crate::navigate::target::{Side, ViewPreference};
 use crate::pipeline::observer::Observer;
-use crate::scene::{CameraPath, CropBox, Identities, IdentityId, NO_IDENTITY, SemanticMap};
+use crate::scene::{Camera, CameraPath, CropBox, Identities, IdentityId, NO_IDENTITY, SemanticMap};
 use crate::ui::actions::{Face, Pane};
 use crate::ui::app::App;
 use crate::ui::color_by::ColorBy;

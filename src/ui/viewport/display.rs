@@ -18,7 +18,7 @@ use crate::scene::Camera;
 use crate::scene::resource_log::{self, ResourceKind};
 use crate::ui::theme;
 use crate::worker::view::{MappedView, ViewPicture, ViewResult};
-use crate::worker::{Failure, Slot, Versioned};
+use crate::worker::{Slot, Versioned};
 
 /// Window of the frame rate, s.
 const RATE_SECS: f64 = 2.0;
@@ -282,6 +282,7 @@ mod tests {
     use super::frame_of as frame;
     use super::*;
     use crate::scene::Bounds;
+    use crate::worker::Failure;
 
     fn failure() -> Failure {
         Failure::new("no", "wait")

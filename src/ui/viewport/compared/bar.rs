@@ -90,7 +90,7 @@ impl Compared {
         }
         ui.label("or the point").on_hover_text("Clicked: what each scene says that it belongs to.");
         ui.spacing_mut().slider_width = 70.0;
-        let mut slider = |ui: &mut Ui, name: &str, value: &mut f32, tip: &str| {
+        let slider = |ui: &mut Ui, name: &str, value: &mut f32, tip: &str| {
             let label = ui.label(RichText::new(name).small()).id;
             ui.add(Slider::new(value, 0.0..=1.0).fixed_decimals(2)).on_hover_text(tip).labelled_by(label);
         };

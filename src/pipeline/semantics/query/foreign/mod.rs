@@ -1,8 +1,8 @@
 //! Foreign results: answers from the Gaussians of other methods, with their values in place of a `SemanticMap`.
 //!
 //! 1. [`cosines`] compares codes with phrases through their decoder.
-//! 2. [`blend`] renders the codes of a view; [`classes`] and [`click`] read classes and clicks from them, [`pointed`]
-//!    what a pixel belongs to.
+//! 2. [`blend`] renders the codes of a view, [`packed`] keeps LangSplatV2's; [`pieces`] turns cosines into relevancy.
+//!    [`classes`] and [`click`] read classes and clicks, [`pointed`] what a pixel belongs to.
 //! 3. [`asked`] holds a result with what is computed once, and gives relevancy of Gaussians and pixels.
 //! 4. [`own_rules`] makes masks as each method does, and one as this program does.
 //! 5. [`features`] gives codes and embeddings of Gaussians as rows, [`named_classes`] answers names of classes.
@@ -21,6 +21,8 @@ pub(crate) mod features;
 pub mod identities;
 pub(crate) mod named_classes;
 pub mod own_rules;
+pub(crate) mod packed;
+pub(crate) mod pieces;
 pub mod pointed;
 
 #[cfg(test)]

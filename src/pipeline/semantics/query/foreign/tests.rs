@@ -3,8 +3,9 @@
 use std::sync::Arc;
 
 use super::asked::{ForeignScene, ForeignView};
-use super::blend::BlendedCodes;
+use super::blend::{BlendedCodes, blend_level};
 use super::click::ClickedFeature;
+use super::own_rules::{ForeignMask, fair_mask};
 use super::pointed::PointedPixel;
 use super::*;
 use crate::io::results::tests::{expected, sample, with_class_names};
@@ -66,6 +67,20 @@ impl Seen {
     fn relevancy(&mut self, level: usize, phrase: ForeignPhrase<'_>) -> Vec<f32> {
         self.scene.pixel_relevancy(&mut self.renderer, &self.view, level, phrase).expect("answered")
     }
+
+    /// The masks by the method's own rule and by the common one.
+    fn masks(&mut self, phrase: ForeignPhrase<'_>) -> (Result<ForeignMask, ForeignError>, ForeignMask) {
+        let found = self.scene.relevancy(&mut self.renderer, &self.view, phrase).expect("answered");
+        let own = self.scene.own_mask(&mut self.renderer, &self.view, phrase, &found);
+        (own, fair_mask(&self.view, &found).expect("a level"))
+    }
+
+    /// Blended numbers of a level, drawn anew.
+    fn blend(&mut self, level: usize) -> BlendedCodes {
+        let of = &self.scene.result.levels[level];
+        let LevelValues::Embedded(embedded) = &of.values else { panic!("no embeddings") };
+        blend_level(&mut self.renderer, &of.cloud, embedded, &self.view.camera).expect("drawn")
+    }
 }
 
 /// Blended numbers, pixel after pixel.
@@ -89,7 +104,7 @@ fn levels_of_langsplat_answer_like_the_reference() {
     {
         let mut seen = Seen::new(place);
         for level in 0..3 {
-            let blended = interleaved(seen.view.blended(level).expect("blended"));
+            let blended = interleaved(&seen.blend(level));
             let wanted = expected(&format!("{folder}/expected/{codes}_pixels_{}.npy", level + 1));
             assert!(apart(&blended, &wanted) < TOLERANCE, "{folder} {level}");
             let difference = relevancy_apart(&mut seen, level, folder, &format!("_{}", level + 1), &texts);
@@ -97,6 +112,34 @@ fn levels_of_langsplat_answer_like_the_reference() {
             let other = relevancy_apart(&mut seen, level, folder, &format!("_{}", (level + 1) % 3 + 1), &texts);
             assert!(other > 10.0 * TOLERANCE, "the control, a level exchanged: {other}");
         }
+    }
+}
+
+#[test]
+fn packed_weights_answer_like_the_blended_ones_of_the_sample() {
+    use super::asked::LevelView;
+    use super::blend::BlendedCosines;
+    use super::cosines::CosineHead;
+    use super::packed::PackedWeights;
+    use super::pieces::relevancy;
+    let texts = Texts::new();
+    let mut seen = Seen::new("langsplat_v2/output");
+    for level in 0..3 {
+        assert!(matches!(seen.view.levels[level], LevelView::Packed(_)));
+        let mut blended = seen.blend(level);
+        let LevelValues::Embedded(embedded) = &seen.scene.result.levels[level].values else { panic!("no embeddings") };
+        let head = CosineHead::new(&embedded.decoder);
+        let directions = head.directions(&texts.all());
+        let plain = relevancy(&BlendedCosines::new(&head, &blended, directions.clone()), 10.0);
+        let found =
+            seen.scene.pixel_relevancy(&mut seen.renderer, &seen.view, level, texts.phrase()).expect("answered");
+        let difference = apart(&found, &plain);
+        assert!(difference < 2e-5, "{level}: {difference}");
+        blended.planes.rotate_left(1);
+        let turned = PackedWeights::new(&head, &blended);
+        let turned = relevancy(&turned.compared(&directions), 10.0);
+        let difference = apart(&turned, &plain);
+        assert!(difference > 10.0 * TOLERANCE, "the control, entries exchanged: {difference}");
     }
 }
 
@@ -280,13 +323,13 @@ fn clusters_of_open_gaussian_answer_like_the_reference() {
     let LevelValues::Clusters(clusters) = &seen.scene.result.levels[0].values else { panic!("no clusters") };
     let relevancy = seen.scene.cluster_relevancy(clusters, texts.phrase()).expect("answered");
     assert!(apart(&relevancy, &expected("opengaussian/expected/relevancy_leaves.npy")) < TOLERANCE);
-    let own = seen.scene.own_mask(&mut seen.renderer, &seen.view, texts.phrase()).expect("answered");
+    let (own, fair) = seen.masks(texts.phrase());
+    let own = own.expect("a rule");
     let wanted = expected("opengaussian/expected/silhouette_pixels.npy");
     let inside: Vec<usize> = (0..wanted.len()).filter(|i| wanted[*i] > 0.7).collect();
     assert_eq!(own.mask.pixels().collect::<Vec<_>>(), inside);
     assert!(!inside.is_empty());
     // The best cluster alone covers less.
-    let fair = seen.scene.fair_mask(&mut seen.renderer, &seen.view, texts.phrase()).expect("answered");
     assert!(!fair.mask.is_empty() && fair.rule != own.rule);
 }
 
@@ -306,8 +349,7 @@ fn segments_of_thgs_answer_like_the_reference() {
     };
     assert_eq!(members(1..3), wanted);
     assert_ne!(members(2..3), wanted, "the control: the coarse level alone");
-    let own = seen.scene.own_mask(&mut seen.renderer, &seen.view, texts.phrase()).expect("answered");
-    assert!(!own.mask.is_empty());
+    assert!(!seen.masks(texts.phrase()).0.expect("a rule").mask.is_empty());
 }
 
 #[test]
@@ -317,14 +359,14 @@ fn every_language_has_a_mask_by_its_own_rule_and_by_the_common_one() {
         ["langsplat/output", "langsplat_v2/output", "occams_lgs", "feature_3dgs/lseg_speedup", "legaussians/output"]
     {
         let mut seen = Seen::new(place);
-        let own = seen.scene.own_mask(&mut seen.renderer, &seen.view, texts.phrase()).expect(place);
-        let fair = seen.scene.fair_mask(&mut seen.renderer, &seen.view, texts.phrase()).expect(place);
+        let (own, fair) = seen.masks(texts.phrase());
+        let own = own.expect(place);
         assert!(!fair.mask.is_empty() && fair.rule != own.rule, "{place}");
         // In a picture of this size, what LangSplat finds is a speck, which its rule takes away.
         assert_eq!(own.mask.is_empty(), place == "langsplat/output", "{place}");
     }
     let mut seen = Seen::new("ludvig");
-    let none = seen.scene.own_mask(&mut seen.renderer, &seen.view, texts.phrase());
+    let (none, _) = seen.masks(texts.phrase());
     assert!(matches!(none, Err(ForeignError::NoRule("LUDVIG"))));
     let short = ForeignPhrase { query: &[1.0; 24], canonical: &[], temperature: 10.0 };
     let e = seen.scene.gaussian_relevancy(0, short).expect_err("another length").to_string();

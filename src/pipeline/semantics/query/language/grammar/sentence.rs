@@ -209,7 +209,8 @@ impl<'a> SentenceReader<'a> {
     fn which_of(&mut self) {
         let (tokens, n) = (self.whole.tokens.clone(), self.whole.tokens.len());
         let is_choice = |e: &Expression| matches!(e.set, SetOf::Union { either: true, .. });
-        for at in (4..n).rev().filter(|at| self.whole.words[1..*at].contains(&"or")) {
+        let or = self.whole.words.iter().position(|w| *w == "or").unwrap_or(n);
+        for at in (or + 2..n).rev() {
             let choices = self.whole.of(tokens[1..at].to_vec()).all();
             for of in choices.iter().filter(|e| is_choice(e)).take(2) {
                 self.said_of(of, tokens[at..].to_vec());
