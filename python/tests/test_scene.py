@@ -65,7 +65,7 @@ class SceneTest(unittest.TestCase):
             self.assertEqual(int(np.argmax(np.median(g.colors[sure], axis=0))), color)
 
     def test_features_of_an_encoder(self) -> None:
-        features = self.scene.features
+        features = self.scene.identity_features
         assert features is not None
         count = len(self.scene.identities)
         self.assertEqual((features.encoder, features.raw.shape[:2]), ("demo", (count, 4)))
@@ -152,7 +152,7 @@ class SceneTest(unittest.TestCase):
             scene = copied(Path(folder))
             (scene / "semantic_map.safetensors").unlink()
             plain = fmlgs.open_scene(scene)
-            self.assertEqual((len(plain.identities), plain.features, plain.assignment.max()), (0, None, 0))
+            self.assertEqual((len(plain.identities), plain.identity_features, plain.assignment.max()), (0, None, 0))
             shutil.rmtree(scene)
 
     def test_parts_belong_to_objects(self) -> None:

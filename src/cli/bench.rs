@@ -18,13 +18,14 @@ use crate::scene::MaskGrid;
 #[command(after_help = "Examples:\n  \
     fmlgs bench splat.ply\n  \
     fmlgs bench --queries 100\n  \
+    fmlgs bench --results 60\n  \
     fmlgs bench --masks mobile-sam --photo photo.jpg\n  \
     fmlgs bench --strokes 60 scene/ splat.ply\n  \
     fmlgs bench --moving splat.ply\n  \
     fmlgs bench splats/*.ply photos/ --size 640x480 --size 1280x720 --max-side 504 --gpu --json")]
 pub(crate) struct BenchArgs {
-    /// Splats or trained scenes to draw, posed photos to train on
-    #[arg(required_unless_present_any = ["queries", "masks"])]
+    /// Splats or trained scenes to draw, posed photos to train on; with --results, results of other methods to ask
+    #[arg(required_unless_present_any = ["queries", "masks", "results"])]
     paths: Vec<PathBuf>,
     /// Size of the drawn images; may be given several times [default: 640x480 1280x720]
     #[arg(long, value_parser = view::parse_size)]
@@ -44,6 +45,13 @@ pub(crate) struct BenchArgs {
     /// Objects and parts of that view
     #[arg(long, value_name = "COUNT", default_value_t = 300, requires = "queries", value_parser = number::within(1..=100_000_usize))]
     identities: usize,
+    /// Time this many phrases asked of results of other methods too: of made-up ones of LangSplatV2 and LangSplat at
+    /// 1008 x 567 px, and of PATHS that are results; those with a network for each pixel are asked once in each view
+    #[arg(long, value_name = "COUNT", value_parser = number::within(1..=100_000_usize))]
+    results: Option<usize>,
+    /// Gaussians of the made-up results
+    #[arg(long, value_name = "COUNT", default_value_t = 300_000, requires = "results", value_parser = number::within(1..=10_000_000_usize))]
+    gaussians: usize,
     /// Time this network on the masks of everything in a photo: a model's name, or the path of its description
     #[arg(long, value_name = "MODEL")]
     masks: Option<String>,
@@ -78,6 +86,7 @@ pub(crate) fn run(args: BenchArgs, quiet: bool) -> Result<(), CliError> {
         repeats: args.repeats as usize,
         gpu: args.gpu,
         queries: args.queries.map(|count| (count, args.identities)),
+        results: args.results.map(|count| (count, args.gaussians)),
         masks: args.masks.map(|model| (model, args.mask_grid, args.photo)),
         strokes: args.strokes,
         moving: args.moving,

@@ -24,7 +24,8 @@ const ROWS: usize = 60;
 #[command(after_help = "Examples:\n  \
     fmlgs compare langsplat/output scene/ --phrases words.txt\n  \
     fmlgs compare a/ b/ c/ d/ --phrases words.txt --views 0,12 --truth labels/ --out side_by_side/\n  \
-    fmlgs compare a/ b/ --phrases words.txt --views all --photos figurines/ --json")]
+    fmlgs compare a/ b/ --phrases words.txt --views all --photos figurines/ --json\n  \
+    fmlgs compare scene/ langsplat/output --encoder langsplat/output=clip-vit-b32 --phrases words.txt")]
 pub(crate) struct CompareArgs {
     /// First scene, a folder or file: pictures of the views are its own
     first: PathBuf,
@@ -55,6 +56,10 @@ pub(crate) struct CompareArgs {
     /// Decoder, codebook or index of a result, as RESULT=FILE, where it is not found beside it
     #[arg(long, value_name = "RESULT=FILE", value_parser = result_and_file)]
     decoder: Vec<(PathBuf, PathBuf)>,
+    /// Text encoder that a result was trained with, as RESULT=NAME, of 'fmlgs models' [default: that of the method's
+    /// authors]
+    #[arg(long, value_name = "RESULT=NAME", value_parser = result_and_name)]
+    encoder: Vec<(PathBuf, String)>,
     /// Longer side of the views at most, px
     #[arg(long, default_value_t = 1_008, value_parser = clap::value_parser!(u32).range(16..=16384))]
     max_side: u32,
@@ -67,21 +72,31 @@ pub(crate) struct CompareArgs {
 }
 
 fn result_and_file(given: &str) -> Result<(PathBuf, PathBuf), String> {
-    match given.split_once('=') {
-        Some((result, file)) if !result.is_empty() && !file.is_empty() => Ok((result.into(), file.into())),
-        _ => Err("expected RESULT=FILE".into()),
-    }
+    result_and(given).map(|(result, file)| (result, file.into())).ok_or_else(|| "expected RESULT=FILE".into())
+}
+
+fn result_and_name(given: &str) -> Result<(PathBuf, String), String> {
+    result_and(given).map(|(result, name)| (result, name.to_owned())).ok_or_else(|| "expected RESULT=NAME".into())
+}
+
+/// A result, and what is said of it after `=`.
+fn result_and(given: &str) -> Option<(PathBuf, &str)> {
+    let (result, value) = given.split_once('=')?;
+    (!result.is_empty() && !value.is_empty()).then(|| (result.into(), value))
 }
 
 impl CompareArgs {
     fn request(&self) -> Result<CompareRequest, CliError> {
         let scenes: Vec<&PathBuf> = std::iter::once(&self.first).chain(&self.others).collect();
-        if let Some((result, _)) = self.decoder.iter().find(|(result, _)| !scenes.contains(&result)) {
-            return Err(CliError::Usage(format!("--decoder: '{}' is none of the scenes", result.display())));
+        let decoders = self.decoder.iter().map(|(result, _)| ("--decoder", result));
+        let mut named = decoders.chain(self.encoder.iter().map(|(result, _)| ("--encoder", result)));
+        if let Some((option, result)) = named.find(|(_, result)| !scenes.contains(result)) {
+            return Err(CliError::Usage(format!("{option}: '{}' is none of the scenes", result.display())));
         }
-        let options = |scene: &PathBuf| {
-            let own = self.decoder.iter().find(|(result, _)| result == scene);
-            ResultOptions { decoder: own.map(|(_, file)| file.clone()), ..ResultOptions::default() }
+        let options = |scene: &PathBuf| ResultOptions {
+            decoder: self.decoder.iter().find(|(result, _)| result == scene).map(|(_, file)| file.clone()),
+            encoder: self.encoder.iter().find(|(result, _)| result == scene).map(|(_, name)| name.clone()),
+            ..ResultOptions::default()
         };
         Ok(CompareRequest {
             scenes: scenes.into_iter().map(|scene| (scene.clone(), options(scene))).collect(),

@@ -69,6 +69,9 @@ pub(crate) struct EvalArgs {
     /// Decoder, codebook or index of another method's result, where it is not found beside it
     #[arg(long, requires = "masks")]
     decoder: Option<PathBuf>,
+    /// Text encoder that another method's result was trained with, of 'fmlgs models' [default: that of its authors]
+    #[arg(long, value_name = "NAME", requires = "masks")]
+    encoder: Option<String>,
     /// Compare depth instead, with the true depths that came with synthetic photos
     #[arg(long, conflicts_with = "masks")]
     depth: bool,
@@ -89,8 +92,19 @@ pub(crate) struct EvalArgs {
 
 /// The table `[eval]` of a batch.
 pub(super) fn of_table(table: &toml::Table) -> Result<BatchEvaluation, String> {
-    const LEFT_OUT: [&str; 10] =
-        ["photos", "held-out-every", "pictures", "masks", "decoder", "query", "depth", "removal", "questions", "json"];
+    const LEFT_OUT: [&str; 11] = [
+        "photos",
+        "held-out-every",
+        "pictures",
+        "masks",
+        "decoder",
+        "encoder",
+        "query",
+        "depth",
+        "removal",
+        "questions",
+        "json",
+    ];
     // Labels are those of each scene.
     let args: EvalArgs = table_args::parse("batch eval", table, &["scene", "--masks=labels"], &LEFT_OUT)?;
     let EvalArgs { max_side, keep_borders, protocol, recipe, .. } = args;
@@ -100,7 +114,8 @@ pub(super) fn of_table(table: &toml::Table) -> Result<BatchEvaluation, String> {
 impl EvalArgs {
     /// The scene, if it is the result of another method.
     fn result(&self) -> Result<Option<CompareSubject>, CliError> {
-        let options = ResultOptions { decoder: self.decoder.clone(), ..ResultOptions::default() };
+        let (decoder, encoder) = (self.decoder.clone(), self.encoder.clone());
+        let options = ResultOptions { decoder, encoder, ..ResultOptions::default() };
         Ok(CompareSubject::of_another_method(&self.scene, &options)?)
     }
 
@@ -149,8 +164,10 @@ pub(crate) fn run(args: EvalArgs, quiet: bool) -> Result<(), CliError> {
     {
         return eval_results::run(result, &args.of_result(labels)?, args.json, quiet);
     }
-    if args.decoder.is_some() {
-        let text = format!("--decoder has no effect here: '{}' is no result of another method", args.scene.display());
+    if let Some((_, option)) =
+        [(args.decoder.is_some(), "--decoder"), (args.encoder.is_some(), "--encoder")].iter().find(|(given, _)| *given)
+    {
+        let text = format!("{option} has no effect here: '{}' is no result of another method", args.scene.display());
         return Err(CliError::Usage(text));
     }
     let comparison = args.check()?;

@@ -23,6 +23,7 @@ mod eval_masks;
 mod eval_removal;
 mod eval_results;
 mod export;
+mod features;
 mod generate;
 mod idle;
 mod import;
@@ -148,6 +149,7 @@ enum Command {
     Demo(demo::DemoArgs),
     Export(export::ExportArgs),
     Import(import::ImportArgs),
+    Features(features::FeaturesArgs),
     Batch(batch::BatchArgs),
     Bench(bench::BenchArgs),
     Report(report::ReportArgs),
@@ -239,6 +241,7 @@ fn run(cli: Cli, open_window: OpenWindow) -> Result<(), CliError> {
         Command::Demo(_) => window(vec![Start::Demo], overrides, open_window),
         Command::Export(args) => export::run(args, quiet),
         Command::Import(args) => import::run(args, quiet),
+        Command::Features(args) => features::run(args, quiet),
         Command::Batch(args) => batch::run(args, quiet),
         Command::Bench(args) => bench::run(args, quiet),
         Command::Report(args) => report::run(args, quiet),

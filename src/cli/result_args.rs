@@ -15,17 +15,24 @@ pub(crate) struct ResultArgs {
     /// Entries of the codebook for each Gaussian of LangSplatV2, as it was trained [default: 4]
     #[arg(long, value_parser = number::within(1..=64_usize))]
     top_k: Option<usize>,
+    /// Text encoder that the result was trained with, of 'fmlgs models' [default: that of the method's authors]
+    #[arg(long, value_name = "NAME")]
+    encoder: Option<String>,
 }
 
 impl ResultArgs {
     /// The options for the readers.
     pub(crate) fn options(&self) -> ResultOptions {
         let usual = ResultOptions::default();
-        ResultOptions { decoder: self.decoder.clone(), top_k: self.top_k.unwrap_or(usual.top_k) }
+        ResultOptions {
+            decoder: self.decoder.clone(),
+            top_k: self.top_k.unwrap_or(usual.top_k),
+            encoder: self.encoder.clone(),
+        }
     }
 
     /// Returns whether any of them is given.
     pub(crate) fn is_given(&self) -> bool {
-        self.decoder.is_some() || self.top_k.is_some()
+        self.decoder.is_some() || self.top_k.is_some() || self.encoder.is_some()
     }
 }

@@ -118,9 +118,8 @@ pub(crate) fn run(
         edit::store(folder, scene.state.as_deref(), &new, &scene.cloud)?;
         let id = new.identities.len() as crate::scene::IdentityId;
         lines.push(format!("kept as '{}': {count}", new.identities.full_name(id)));
-        lines.extend(
-            edit::emptied(&map, &new).iter().map(|name| format!("{name} is empty now: it had no other Gaussians")),
-        );
+        let emptied = edit::emptied(&map, &new);
+        lines.extend(emptied.iter().map(|emptied| format!("{name} took all Gaussians of {emptied}")));
     }
     output::print(&lines.join("\n"))
 }

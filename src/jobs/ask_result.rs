@@ -1,18 +1,19 @@
 //! Questions to results of other methods: a phrase becomes relevancy of Gaussians and pixels, and masks by the method's
 //! own rule and by the common one.
 
+use std::path::Path;
 use std::sync::Arc;
 use std::time::Instant;
 
 use serde::Serialize;
 
 use super::{JobError, Scene};
-use crate::io::results::{
-    self, EmbeddedLevel, LevelCodes, LevelValues, Method, MethodKind, MethodResult, ResultOptions,
-};
+use crate::io::results::{self, EmbeddedLevel, LevelCodes, LevelValues, MethodKind, MethodResult, ResultOptions};
+use crate::io::{IoError, files, npy};
+use crate::math::vector::unit;
 use crate::models::{self, ModelError, TextSource};
 use crate::pipeline::semantics::query::foreign::asked::ForeignScene;
-use crate::pipeline::semantics::query::foreign::own_rules::ForeignMask;
+use crate::pipeline::semantics::query::foreign::own_rules::{ForeignMask, fair_mask};
 use crate::pipeline::semantics::query::foreign::{ForeignError, ForeignPhrase};
 use crate::pipeline::semantics::query::recipe::{LERFS_PHRASES, TEMPERATURE};
 use crate::pipeline::semantics::query::timing::ms_since;
@@ -27,7 +28,11 @@ pub(crate) fn open(scene: &Scene, options: &ResultOptions) -> Result<ForeignScen
     Ok(ForeignScene::new(read(scene, options)?))
 }
 
-fn read(scene: &Scene, options: &ResultOptions) -> Result<Arc<MethodResult>, JobError> {
+/// Reads the result that a scene was read from.
+///
+/// # Errors
+/// If the scene is none, or it cannot be read exactly.
+pub(super) fn read(scene: &Scene, options: &ResultOptions) -> Result<Arc<MethodResult>, JobError> {
     match &scene.result {
         Some(result) if *options == ResultOptions::default() => Ok(Arc::clone(result)),
         _ => Ok(Arc::new(results::open_result(&scene.path, options)?)),
@@ -42,12 +47,12 @@ pub(crate) struct PhraseVectors {
     pub(crate) encode_ms: f64,
 }
 
-/// Embeds a phrase by the encoder that a method was trained with.
+/// Embeds a phrase by the encoder that a result was trained with.
 ///
 /// # Errors
-/// If the method knows no language, or its encoder is not on this machine.
-pub(crate) fn encoded(method: Method, text: &str) -> Result<PhraseVectors, JobError> {
-    let name = method.encoder().ok_or_else(|| ForeignError::of_silent(method))?;
+/// If the result knows no language, or its encoder is not on this machine.
+pub(crate) fn encoded(result: &MethodResult, text: &str) -> Result<PhraseVectors, JobError> {
+    let name = result.encoder.as_deref().ok_or_else(|| ForeignError::of_silent(result.method))?;
     vectors(&mut *models::encoder(name)?, text)
 }
 
@@ -65,6 +70,35 @@ pub(crate) fn vectors<S: TextSource<Error = ModelError> + ?Sized>(
     let mut all = source.texts(&phrases).into_iter().collect::<Result<Vec<_>, _>>()?;
     let canonical = all.split_off(1.min(all.len()));
     let query = all.pop().ok_or(JobError::EmptyQuery)?;
+    Ok(PhraseVectors { query, canonical, encode_ms: ms_since(start) })
+}
+
+/// Reads the embeddings of a phrase and of the canonical ones from a NumPy array: a row for each, the phrase first.
+///
+/// # Errors
+/// If it is no array of two rows or more, or a row has no direction.
+pub(crate) fn stored_vectors(file: &Path) -> Result<PhraseVectors, JobError> {
+    let start = Instant::now();
+    let bytes = files::read(file, files::MAX_PICTURE_BYTES)?;
+    let array = npy::open(&bytes, file)?;
+    let bad = |reason: String| IoError::syntax(file, "npy", reason);
+    let expected = "expected [rows, numbers]: the phrase's embedding, and one for each canonical phrase";
+    let shape = || bad(format!("its shape is {:?}; {expected}", array.shape()));
+    let &[rows, dim] = array.shape() else { return Err(shape().into()) };
+    if rows < 2 || dim == 0 {
+        return Err(shape().into());
+    }
+    let (claimed, possible) = (rows.saturating_mul(dim), array.possible);
+    if claimed > possible {
+        return Err(IoError::Count { path: file.into(), what: "numbers".into(), claimed, possible }.into());
+    }
+    let values: Vec<f32> = array.values()?.into_iter().map(|v| v as f32).collect();
+    let one = |(i, row): (usize, &[f32])| {
+        unit(row).ok_or_else(|| bad(format!("row {i} is zero or not finite; each is the embedding of a phrase")))
+    };
+    let mut rows = values.chunks_exact(dim as usize).enumerate().map(one);
+    let query = rows.next().ok_or(JobError::EmptyQuery)??;
+    let canonical = rows.collect::<Result<Vec<_>, _>>()?;
     Ok(PhraseVectors { query, canonical, encode_ms: ms_since(start) })
 }
 
@@ -114,15 +148,16 @@ pub(crate) fn ask(
     let view = scene.look(&mut renderer, camera)?;
     let view_ms = ms_since(start);
     let start = Instant::now();
-    let common = scene.fair_mask(&mut renderer, &view, phrase)?;
+    let all = scene.relevancy(&mut renderer, &view, phrase)?;
+    let common = fair_mask(&view, &all)?;
     let level = level.unwrap_or(common.level);
-    let relevancy = scene.pixel_relevancy(&mut renderer, &view, level, phrase)?;
     let gaussians = scene.gaussian_relevancy(level, phrase)?;
-    let own = match scene.own_mask(&mut renderer, &view, phrase) {
+    let own = match scene.own_mask(&mut renderer, &view, phrase, &all) {
         Ok(mask) => Ok(mask),
         Err(e @ ForeignError::NoRule(_)) => Err(e.to_string()),
         Err(e) => return Err(e.into()),
     };
+    let relevancy = all.into_iter().nth(level).ok_or(ForeignError::Level(level))?;
     let best = gaussians.iter().copied().enumerate().max_by(|a, b| a.1.total_cmp(&b.1).then(b.0.cmp(&a.0)));
     Ok(ResultAnswer {
         level,
@@ -222,8 +257,8 @@ fn in_words(values: &LevelValues) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::io::results::tests::{expected, samples};
-    use crate::jobs::open as opening;
+    use crate::io::results::tests::{expected, sample, samples};
+    use crate::jobs::{export, open as opening};
 
     /// Vectors of the samples in place of an encoder's.
     fn given() -> PhraseVectors {
@@ -259,13 +294,38 @@ mod tests {
     }
 
     #[test]
+    fn vectors_of_a_file_answer_like_those_of_an_encoder() {
+        let known = stored_vectors(&samples().join("scene/texts.npy")).expect("five phrases");
+        let given = given();
+        let near = |a: &[f32], b: &[f32]| a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-6);
+        assert!(near(&known.query, &given.query) && known.canonical.len() == 4);
+        assert!(known.canonical.iter().zip(&given.canonical).all(|(a, b)| near(a, b)));
+        assert!(!near(&known.query, &given.canonical[0]), "the control: another row");
+        let folder = tempfile::tempdir().expect("folder");
+        let file = folder.path().join("a.npy");
+        let refused = |shape: &[usize], values: &[f32]| {
+            export::npy_blocks(&file, shape, |_| values.to_vec()).expect("written");
+            stored_vectors(&file).expect_err("refused").to_string()
+        };
+        assert!(refused(&[3], &[1.0; 3]).contains("[3]"));
+        assert!(refused(&[1, 3], &[1.0; 3]).contains("canonical"), "a phrase alone");
+        let zero = refused(&[2, 2], &[1.0, 0.0, 0.0, 0.0]);
+        assert!(zero.contains("row 1") && zero.contains("a.npy"), "{zero}");
+        assert!(refused(&[2, 2], &[f32::NAN, 0.0, 1.0, 0.0]).contains("row 0"));
+        std::fs::write(&file, "no array").expect("written");
+        assert!(stored_vectors(&file).expect_err("no array").to_string().contains("npy"));
+        assert!(stored_vectors(&folder.path().join("b.npy")).is_err(), "missing");
+    }
+
+    #[test]
     fn methods_without_language_and_wrong_vectors_are_refused() {
-        assert!(matches!(encoded(Method::Saga, "kettle"), Err(JobError::Foreign(ForeignError::NoLanguage("SAGA")))));
-        let silent = encoded(Method::SemanticGaussiansOpenSeg, "kettle").expect_err("no encoder").to_string();
-        assert!(
-            silent.contains("Semantic Gaussians") && silent.contains("ViT-L/14") && silent.contains("LSeg"),
-            "{silent}"
-        );
+        let saga = sample("saga");
+        assert!(matches!(encoded(&saga, "kettle"), Err(JobError::Foreign(ForeignError::NoLanguage("SAGA")))));
+        let mut silent = sample("semantic_gaussians");
+        (silent.method, silent.encoder) = (results::Method::SemanticGaussiansOpenSeg, None);
+        let silent = encoded(&silent, "kettle").expect_err("no encoder").to_string();
+        assert!(silent.contains("Semantic Gaussians") && silent.contains("ViT-L/14"), "{silent}");
+        assert!(silent.contains("LSeg") && silent.contains("--encoder"), "{silent}");
         let mut source = |_: &str| -> Result<Vec<f32>, ModelError> { Ok(vec![1.0, 0.0]) };
         assert!(matches!(vectors(&mut source, "  "), Err(JobError::EmptyQuery)));
         let short = vectors(&mut source, "kettle").expect("two numbers");
@@ -273,6 +333,12 @@ mod tests {
         let asked = open(&scene, &ResultOptions::default()).expect("reads");
         let refused = ask(&asked, &scene.cameras[0].camera, &short, None).expect_err("too short").to_string();
         assert!(refused.contains("2 numbers") && refused.contains("clip-vit-b16"), "{refused}");
+        // The encoder that is named is the one that encodes.
+        let named = ResultOptions { encoder: Some("demo".into()), ..ResultOptions::default() };
+        let asked = open(&scene, &named).expect("reads");
+        let by_demo = encoded(&asked.result, "kettle").expect("part of the program");
+        let refused = ask(&asked, &scene.cameras[0].camera, &by_demo, None).expect_err("narrower").to_string();
+        assert!(["demo", "128 numbers", "512", "--encoder"].iter().all(|word| refused.contains(word)), "{refused}");
     }
 
     #[test]

@@ -5,17 +5,21 @@ use std::sync::Arc;
 
 use super::JobError;
 use super::select::{self, PrepareRequest, SelectFor, SelectRequest, SelectStep, Stroke};
+use crate::io::results::{self, OPEN_CLIP, ResultOptions};
 use crate::io::scene_files::SELECTION_FILE;
 use crate::io::scene_files::is_scene;
 use crate::io::splat_format::SplatFormat;
 use crate::io::{self, Opened};
 use crate::measure::StudyError;
+use crate::measure::bench::made_up_results::{lang_splat, lang_splat_v2};
+use crate::measure::bench::results::{self as asking, AskedResult, BenchPhrases};
 use crate::measure::bench::{
-    StageSample, StageValues, Timings, draw, label, masks, moving, one_core, query, questions, train,
+    StageSample, StageValues, Timings, draw, label, masks, moving, one_core, query, questions, train, views_of,
 };
 use crate::models;
 use crate::pipeline::observer::{Interrupted, Observer, Severity};
 use crate::pipeline::semantics::lifting::network_segmenter::NetworkMasks;
+use crate::pipeline::semantics::query::foreign::asked::ForeignScene;
 use crate::pipeline::train::{TrainConfig, TrainView, load_views};
 use crate::render::{Device, RenderSettings, Renderer};
 use crate::scene::{Camera, Dataset, GaussianCloud, HomeView, Mask, MaskGrid, NO_IDENTITY, PhotoPixels};
@@ -28,6 +32,9 @@ const STROKES_SIZE: [u32; 2] = [640, 480];
 const STROKE_RADIUS_PX: usize = 3;
 /// Size in px of the views of a moving camera.
 const MOVING_SIZE: [u32; 2] = [1_008, 567];
+/// Size in px of the views in which results of other methods are asked, and the number of these views.
+const RESULTS_SIZE: [u32; 2] = [1_008, 567];
+const RESULTS_VIEWS: usize = 3;
 /// Size in px of a synthetic photo.
 const PHOTO_SIZE: [u32; 2] = [1_008, 756];
 
@@ -43,6 +50,8 @@ pub(crate) struct BenchRequest {
     pub(crate) gpu: bool,
     /// Number of timed queries, and number of objects and parts in their view.
     pub(crate) queries: Option<(usize, usize)>,
+    /// Number of timed phrases asked of results of other methods, and number of Gaussians of those that are made up.
+    pub(crate) results: Option<(usize, usize)>,
     /// Network whose masks of everything in a photo are timed, its grid, and the photo; `None` for a synthetic one.
     pub(crate) masks: Option<(String, MaskGrid, Option<PathBuf>)>,
     /// Number of timed selection strokes in each scene.
@@ -66,6 +75,9 @@ pub(crate) fn run(request: &BenchRequest, observer: &mut dyn Observer) -> Result
         let mut encoder = models::encoder(models::DEMO)?;
         samples.extend(query::time(encoder.as_mut(), identities, QUERY_SIZE, count)?);
     }
+    if let Some((count, gaussians)) = request.results {
+        samples.extend(made_up_results(count, gaussians, observer)?);
+    }
     if let Some((model, grid, photo)) = &request.masks {
         observer.note(Severity::Info, format!("Finding everything in a photo with {model}"));
         let photo = photo.as_deref().map_or_else(|| Ok(checks()), io::photo::open)?;
@@ -77,6 +89,14 @@ pub(crate) fn run(request: &BenchRequest, observer: &mut dyn Observer) -> Result
     }
     for path in &request.paths {
         let name = label(path);
+        if let Some((count, _)) = request.results
+            && results::sniff(path).is_some()
+        {
+            let result = results::open_result(path, &ResultOptions::default())?;
+            let phrases = BenchPhrases::random(&result, count);
+            samples.extend(asked(&name, AskedResult { result, phrases }, observer)?);
+            continue;
+        }
         let (cloud, cameras) = match io::open(path)? {
             Opened::Dataset(dataset) => {
                 let (config, views) = photos(&dataset, request.max_side_px, observer)?;
@@ -107,6 +127,33 @@ pub(crate) fn run(request: &BenchRequest, observer: &mut dyn Observer) -> Result
         }
     }
     Ok(Timings { gpu: device.as_ref().map(Device::describe), samples })
+}
+
+/// Times phrases asked of made-up results of LangSplatV2 and LangSplat, and their encoding if the encoder is here.
+fn made_up_results(count: usize, gaussians: usize, observer: &mut dyn Observer) -> Result<Vec<StageSample>, JobError> {
+    let mut samples = Vec::new();
+    match models::encoder(OPEN_CLIP) {
+        Ok(mut encoder) => samples.extend(asking::encoding(encoder.as_mut(), count)?),
+        Err(e) => observer.note(Severity::Warning, format!("The encoding of phrases is not timed: {e}")),
+    }
+    samples.extend(asked("made-up LangSplatV2", lang_splat_v2(gaussians, count)?, observer)?);
+    samples.extend(asked("made-up LangSplat", lang_splat(gaussians, count)?, observer)?);
+    Ok(samples)
+}
+
+/// Times phrases asked of a result, in views of its cameras or around it.
+fn asked(name: &str, of: AskedResult, observer: &mut dyn Observer) -> Result<Vec<StageSample>, JobError> {
+    let AskedResult { result, phrases } = of;
+    observer.note(Severity::Info, format!("Asking {name}"));
+    let own = result.cameras.iter().take(RESULTS_VIEWS);
+    let mut cameras: Vec<Camera> = own.map(|c| c.camera.limited_to(RESULTS_SIZE[0])).collect();
+    if cameras.is_empty() {
+        cameras = views_of(&result.cloud, RESULTS_SIZE[0], RESULTS_SIZE[1]);
+    }
+    let scene = ForeignScene::new(Arc::new(result));
+    let timed = asking::time(name, &scene, &cameras, &phrases, &mut || observer.proceed().is_ok())?;
+    observer.proceed()?;
+    Ok(timed)
 }
 
 /// Times selections by strokes in the first view, three strokes each.

@@ -3,6 +3,7 @@
 //! An output is never an input or a file of a scene.
 
 use std::io::Write;
+use std::ops::Range;
 use std::path::Path;
 
 use image::codecs::png::PngEncoder;
@@ -15,6 +16,9 @@ use crate::io::splat_format::SplatFormat;
 use crate::io::{self, IoError, atomic, files, scene_files, trained};
 use crate::navigate::{CameraSpline, Pose, Speed};
 use crate::scene::{CameraPath, CropBox, GaussianCloud, Identities, IdentityId, PathKey, PhotoPixels};
+
+/// Rows of an array that are in memory at a time.
+const BLOCK_ROWS: usize = 1 << 12;
 
 /// Writes Gaussians as a `.ply` for any viewer.
 ///
@@ -69,10 +73,24 @@ pub(super) fn encode_png(out: impl Write, samples: &[u8], size_px: [u32; 2], col
 
 /// Writes rows of values as a NumPy array of shape `[height, width]`.
 pub(crate) fn npy<T: npyz::AutoSerialize + Copy>(path: &Path, values: &[T], size_px: [u32; 2]) -> Result<(), IoError> {
+    npy_blocks(path, &[size_px[1] as usize, size_px[0] as usize], |rows| {
+        values[rows.start * size_px[0] as usize..rows.end * size_px[0] as usize].to_vec()
+    })
+}
+
+/// Writes a NumPy array; `block` makes the values of some rows of its first axis at a time.
+pub(crate) fn npy_blocks<T: npyz::AutoSerialize>(
+    path: &Path,
+    shape: &[usize],
+    mut block: impl FnMut(Range<usize>) -> Vec<T>,
+) -> Result<(), IoError> {
     atomic::write(path, |w: &mut dyn Write| {
-        let shape = [u64::from(size_px[1]), u64::from(size_px[0])];
-        let mut array = npyz::WriteOptions::new().default_dtype().shape(&shape).writer(w).begin_nd()?;
-        array.extend(values.iter().copied())?;
+        let lengths: Vec<u64> = shape.iter().map(|n| *n as u64).collect();
+        let mut array = npyz::WriteOptions::new().default_dtype().shape(&lengths).writer(w).begin_nd()?;
+        let rows = shape.first().copied().unwrap_or(0);
+        for from in (0..rows).step_by(BLOCK_ROWS) {
+            array.extend(block(from..rows.min(from + BLOCK_ROWS)))?;
+        }
         array.finish()
     })
 }
@@ -180,5 +198,13 @@ mod tests {
         let array = npyz::NpyFile::new(&bytes[..]).expect("npy");
         assert_eq!(array.shape(), [2, 3]);
         assert_eq!(array.into_vec::<f32>().expect("values")[1], 2.5);
+        // Over more than one block.
+        let count = BLOCK_ROWS + 3;
+        npy_blocks(&path, &[count, 2], |rows| rows.flat_map(|i| [i as i64, -1]).collect()).expect("write");
+        let bytes = std::fs::read(&path).expect("read");
+        let array = npyz::NpyFile::new(&bytes[..]).expect("npy");
+        assert_eq!(array.shape(), [count as u64, 2]);
+        let values = array.into_vec::<i64>().expect("values");
+        assert_eq!(values[2 * (count - 1)..], [count as i64 - 1, -1]);
     }
 }

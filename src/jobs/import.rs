@@ -25,6 +25,14 @@ pub(crate) struct ImportRequest {
     pub(crate) options: ResultOptions,
 }
 
+impl ImportRequest {
+    /// Import of an open result; `scale` counts for SAGA's objects.
+    pub(crate) fn of_scene(scene: &Scene, out: PathBuf, scale: f32) -> Self {
+        let scale = (scene.method == Some(Method::Saga)).then_some(scale);
+        Self { path: scene.path.clone(), out, scale, options: ResultOptions::default() }
+    }
+}
+
 /// An imported scene.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub(crate) struct ImportedScene {

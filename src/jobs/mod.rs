@@ -26,6 +26,7 @@ pub(crate) mod export;
 pub(crate) mod export_all;
 pub(crate) mod export_forecast;
 pub(crate) mod export_splat;
+pub(crate) mod features;
 pub mod find_objects;
 pub(crate) mod folders;
 pub(crate) mod go_to;

@@ -9,6 +9,7 @@ use super::{JobError, Scene, export};
 use crate::math::colormap::Colormap;
 use crate::pipeline::removal::invented_flags;
 use crate::pipeline::semantics::code_map::CodeMap;
+use crate::pipeline::semantics::evaluation::langsplat;
 use crate::pipeline::semantics::lifting::votes::UNKNOWN;
 use crate::pipeline::semantics::query::answer::{Basis, QueryAnswer};
 use crate::pipeline::semantics::query::language::QueryPlace;
@@ -18,6 +19,7 @@ pub(crate) use crate::pipeline::semantics::query::query_engine::{QueryEngine, an
 use crate::pipeline::semantics::query::reading::QueryReading;
 use crate::pipeline::semantics::query::recipe::QueryConfig;
 use crate::pipeline::semantics::query::timing::ms_since;
+use crate::pipeline::semantics::smoothing::{BY_COMMON_RULE, by_common_rule};
 use crate::pipeline::semantics::view_map::ViewMap;
 use crate::render::{DrawError, Features, RenderError, RenderSettings, Renderer};
 use crate::scene::{Camera, GaussianCloud, IdentityId, LevelFilter, Mask, NO_IDENTITY, SemanticMap};
@@ -133,6 +135,31 @@ pub(crate) struct QueryResult {
     /// Milliseconds from the text to the mask, with the view drawn before.
     pub(crate) query_ms: f64,
     pub(crate) maps: ViewMaps,
+}
+
+/// Own rule of this program in words.
+pub(crate) const BY_IDENTITY: &str = "pixels of the object or part that is the answer";
+
+/// A mask by a rule.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct RuledMask {
+    pub(crate) mask: Mask,
+    /// Name of the level that it was taken from.
+    pub(crate) level: &'static str,
+    /// The rule in words.
+    pub(crate) rule: &'static str,
+}
+
+impl QueryResult {
+    /// Returns the mask by the rule that is the same for all methods.
+    pub(crate) fn common_mask(&self, map: &SemanticMap) -> RuledMask {
+        let (seen, rule) = (&self.maps.identities, BY_COMMON_RULE);
+        let levels = langsplat::levels(&self.answered, seen, &map.identities);
+        match by_common_rule(&levels, seen.width_px, seen.height_px) {
+            Some(found) => RuledMask { mask: found.mask, level: ["object", "part"][found.level.min(1)], rule },
+            None => RuledMask { mask: Mask::empty(seen.width_px, seen.height_px), level: "object", rule },
+        }
+    }
 }
 
 pub(crate) fn run(scene: &Scene, map: &SemanticMap, request: &QueryRequest<'_>) -> Result<QueryResult, JobError> {

@@ -5,7 +5,7 @@ use crate::scene::colors;
 use crate::scene::identity::name_words::{singular, words};
 use crate::scene::{Identities, IdentityId, NO_IDENTITY};
 use crate::ui::actions::{Action, Pane};
-use crate::ui::object_menu;
+use crate::ui::object_menu::{self, MenuThing};
 use crate::worker::ViewMode;
 
 /// Most words between two words of a phrase.
@@ -172,7 +172,9 @@ pub(super) fn offers(sentence: &str, all: &Identities, is_missing: bool) -> Vec<
         Some((OnThing(action), named)) => match named.or_else(thing) {
             Some(id) => {
                 let action = action(id);
-                let known = object_menu::named_actions(all, id).into_iter().find(|(known, _)| *known == action);
+                let known = object_menu::named_actions(MenuThing { all, id, is_hidden: false })
+                    .into_iter()
+                    .find(|(known, _)| *known == action);
                 vec![known.unwrap_or_else(|| (action.clone(), action.text()))]
             }
             None => {
@@ -340,7 +342,8 @@ mod tests {
         assert_eq!(said("take a screenshot"), [Action::Screenshot.text()]);
         assert_eq!(said("paint the kettle blue"), ["Move, turn or recolor: kettle"]);
         // Every action of the table is in the menu of a thing or in the palette.
-        let (palette, menu) = (Action::all(), object_menu::named_actions(&table(), 1));
+        let (palette, menu) =
+            (Action::all(), object_menu::named_actions(MenuThing { all: &table(), id: 1, is_hidden: false }));
         for (phrases, offered) in OFFERS {
             let actions = match offered {
                 These(actions) => actions(),

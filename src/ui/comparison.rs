@@ -1,14 +1,19 @@
-//! Another scene beside the current one: its Gaussians in the second view, from the same camera.
+//! Other scenes beside the current one: their Gaussians in views of their own, from the same camera.
 
 use std::path::PathBuf;
 use std::sync::Arc;
 
+use crate::jobs::compare::MOST_SCENES;
+use crate::jobs::compare::subject::AskedScene;
 use crate::jobs::{OpenedScene, Scene};
 use crate::render::RenderSettings;
 use crate::scene::GaussianCloud;
 use crate::worker::Versioned;
 
-/// Another scene in the second view.
+/// Scenes beside the current one at most.
+pub(crate) const MOST_BESIDE: usize = MOST_SCENES - 1;
+
+/// Another scene beside the current one.
 #[derive(Clone, Debug)]
 pub struct ComparedScene {
     pub name: String,
@@ -17,13 +22,19 @@ pub struct ComparedScene {
     pub(crate) cloud: Versioned<GaussianCloud>,
     /// Render settings that it was trained with.
     pub(crate) settings: RenderSettings,
+    /// What it can be asked, if anything.
+    pub(crate) asked: Option<Versioned<AskedScene>>,
+    /// True if a removal from the current scene made it.
+    pub(crate) is_removal: bool,
 }
 
 impl ComparedScene {
-    /// Content of a scene for the second view; `None` if it has no Gaussians.
+    /// Content of a scene for a view; `None` if it has no Gaussians.
     pub(crate) fn of(scene: OpenedScene) -> Option<Self> {
         let cloud = Versioned::new(Arc::clone(scene.gaussians()?));
-        let Scene { name, path, settings, .. } = scene.scene;
-        Some(Self { name, path, cloud, settings })
+        let asked = AskedScene::of(&scene.scene, scene.semantics.as_ref()).map(|asked| Versioned::new(Arc::new(asked)));
+        let Scene { name, path, settings, method, .. } = scene.scene;
+        let name = method.map_or_else(|| name.clone(), |method| format!("{}: {name}", method.name()));
+        Some(Self { name, path, cloud, settings, asked, is_removal: false })
     }
 }

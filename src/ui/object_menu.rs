@@ -19,14 +19,23 @@ enum Row {
     Line,
 }
 
-fn rows(all: &Identities, id: IdentityId) -> [Row; 17] {
+/// A thing that a menu acts on.
+#[derive(Clone, Copy)]
+pub(crate) struct MenuThing<'a> {
+    pub(crate) all: &'a Identities,
+    pub(crate) id: IdentityId,
+    /// True if none of it is drawn.
+    pub(crate) is_hidden: bool,
+}
+
+fn rows(MenuThing { all, id, is_hidden }: MenuThing<'_>) -> [Row; 17] {
     let plain = |action, name| Row::Do(action, name, None);
     [
         Row::Do(Action::GoToTarget(id, Side::Best), "Go there", Some(Action::GoToSelected)),
         plain(Action::Turntable(Some(id)), "Turntable"),
         plain(Action::Ask(all.full_name(id)), "Ask for this"),
         Row::Do(Action::Isolate(Some(id)), "Isolate", Some(Action::IsolateSelected)),
-        Row::Do(Action::Hide(id), "Hide or show", Some(Action::HideSelected)),
+        Row::Do(Action::Hide(id), if is_hidden { "Show" } else { "Hide" }, Some(Action::HideSelected)),
         Row::Line,
         Row::Do(Action::RenameThis(id), "Rename\u{2026}", Some(Action::Rename)),
         Row::MergeInto,
@@ -43,18 +52,18 @@ fn rows(all: &Identities, id: IdentityId) -> [Row; 17] {
 }
 
 /// Actions on a thing with their names, as they are searched: "Remove and fill: mug".
-pub(crate) fn named_actions(all: &Identities, id: IdentityId) -> Vec<(Action, String)> {
-    let name = all.full_name(id);
+pub(crate) fn named_actions(thing: MenuThing<'_>) -> Vec<(Action, String)> {
+    let name = thing.all.full_name(thing.id);
     let named = |row| match row {
         Row::Do(action, text, _) => Some((action, format!("{}: {name}", text.trim_end_matches('\u{2026}')))),
         Row::MergeInto | Row::Line => None,
     };
-    rows(all, id).into_iter().filter_map(named).collect()
+    rows(thing).into_iter().filter_map(named).collect()
 }
 
 /// The action with a key that does the same as this one of the selected thing.
-pub(crate) fn keyed(all: &Identities, id: IdentityId, action: &Action) -> Option<Action> {
-    rows(all, id).into_iter().find_map(|row| match row {
+pub(crate) fn keyed(thing: MenuThing<'_>, action: &Action) -> Option<Action> {
+    rows(thing).into_iter().find_map(|row| match row {
         Row::Do(own, _, keyed) if own == *action => keyed,
         _ => None,
     })
@@ -64,16 +73,11 @@ pub(crate) fn keyed(all: &Identities, id: IdentityId, action: &Action) -> Option
 pub(crate) fn show(ui: &mut Ui, all: &Identities, id: IdentityId, is_hidden: bool, cx: &mut Ctx<'_>) {
     ui.label(RichText::new(text::elided(&cx.state.labels.full_name(all, id), 48)).strong());
     ui.separator();
-    for row in rows(all, id) {
+    for row in rows(MenuThing { all, id, is_hidden }) {
         match row {
             Row::Line => drop(ui.separator()),
             Row::MergeInto => drop(ui.menu_button("Merge into", |ui| merge_into(ui, all, id, cx))),
             Row::Do(action, name, keyed) => {
-                let name = match action {
-                    Action::Hide(_) if is_hidden => "Show",
-                    Action::Hide(_) => "Hide",
-                    _ => name,
-                };
                 let button = match keyed {
                     Some(keyed) => Button::new(name).shortcut_text(keys::label(ui.ctx(), &keyed)),
                     None => Button::new(name),

@@ -4,8 +4,8 @@ use egui::{Align2, Key, Modifiers, RichText, ScrollArea, TextEdit};
 
 use super::keys;
 use super::layout::Layout;
-use super::{object_menu, theme};
-use crate::scene::{Identities, IdentityId};
+use super::object_menu::{self, MenuThing};
+use super::theme;
 use crate::ui::actions::Action;
 
 #[derive(Default)]
@@ -31,7 +31,7 @@ impl Palette {
         &mut self,
         ctx: &egui::Context,
         layout: &Layout,
-        selection: Option<(&Identities, IdentityId)>,
+        selection: Option<MenuThing<'_>>,
     ) -> Option<Action> {
         if !self.open {
             return None;
@@ -73,7 +73,7 @@ impl Palette {
                     ui.weak("No matching action.");
                 }
                 for (i, (action, title)) in found.iter().enumerate() {
-                    let keyed = selection.and_then(|(all, id)| object_menu::keyed(all, id, action));
+                    let keyed = selection.and_then(|thing| object_menu::keyed(thing, action));
                     let row = egui::Button::selectable(i == self.selected, title)
                         .shortcut_text(keys::label(ui.ctx(), keyed.as_ref().unwrap_or(action)))
                         .min_size(egui::vec2(ui.available_width(), 28.0));
@@ -108,7 +108,7 @@ fn title(action: &Action) -> String {
 
 /// Actions whose titles hold every word of the query: those that begin with it, then those with words that begin so, then
 /// those with the letters anywhere. A query that looks like a path gives only the action that opens it.
-fn matches(query: &str, layout: &Layout, selection: Option<(&Identities, IdentityId)>) -> Vec<(Action, String)> {
+fn matches(query: &str, layout: &Layout, selection: Option<MenuThing<'_>>) -> Vec<(Action, String)> {
     let path = query.trim();
     if path.starts_with(['/', '.', '~']) || path.contains(":\\") {
         let home = path.strip_prefix("~/").and_then(|rest| Some(std::env::home_dir()?.join(rest)));
@@ -123,7 +123,7 @@ fn matches(query: &str, layout: &Layout, selection: Option<(&Identities, Identit
         let title = format!("{} {}", title.to_lowercase(), other_words(action));
         words.iter().all(|w| title.contains(w))
     };
-    let of_selection = selection.map(|(all, id)| object_menu::named_actions(all, id)).unwrap_or_default();
+    let of_selection = selection.map(object_menu::named_actions).unwrap_or_default();
     let of_window = Action::all().into_iter().filter(can_be_done).map(|a| {
         let title = title(&a);
         (a, title)
@@ -226,8 +226,12 @@ fn sheet_grid(ui: &mut egui::Ui, title: &str, rows: &[(String, String)]) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::{Level, NO_IDENTITY};
+    use crate::scene::{Identities, IdentityId, Level, NO_IDENTITY};
     use crate::ui::actions::Pane;
+
+    fn thing(all: &Identities, id: IdentityId, is_hidden: bool) -> MenuThing<'_> {
+        MenuThing { all, id, is_hidden }
+    }
 
     fn found(query: &str) -> Vec<Action> {
         matches(query, &Layout::default(), None).into_iter().map(|(action, _)| action).collect()
@@ -238,11 +242,11 @@ mod tests {
         let mut all = Identities::default();
         let mug = all.add(Level::Object, NO_IDENTITY, vec!["mug".into()]);
         let titles = |query: &str| {
-            let found = matches(query, &Layout::default(), Some((&all, mug)));
+            let found = matches(query, &Layout::default(), Some(thing(&all, mug, false)));
             found.into_iter().map(|(_, title)| title).collect::<Vec<_>>()
         };
         assert_eq!(titles("")[0], "Go there: mug");
-        assert_eq!(titles("").len(), found("").len() + object_menu::named_actions(&all, mug).len());
+        assert_eq!(titles("").len(), found("").len() + object_menu::named_actions(thing(&all, mug, false)).len());
         for (query, title) in [
             ("move", "Move, turn or recolor: mug"),
             ("recolor", "Move, turn or recolor: mug"),
@@ -254,6 +258,9 @@ mod tests {
             assert_eq!(titles(query)[0], title, "{query}");
         }
         assert!(found("recolor").is_empty(), "nothing is selected");
+        let hides = |is_hidden| matches("mug", &Layout::default(), Some(thing(&all, mug, is_hidden))).into_iter();
+        let title = |is_hidden| hides(is_hidden).find(|(action, _)| *action == Action::Hide(mug)).expect("there").1;
+        assert_eq!([title(false), title(true)], ["Hide: mug", "Show: mug"], "what it does now");
     }
 
     #[test]
@@ -273,7 +280,7 @@ mod tests {
     fn the_beginning_of_a_word_beats_letters_within_one() {
         let mut all = Identities::default();
         let mug = all.add(Level::Object, NO_IDENTITY, vec!["mug".into()]);
-        let first = |query: &str| matches(query, &Layout::default(), Some((&all, mug))).swap_remove(0).1;
+        let first = |query: &str| matches(query, &Layout::default(), Some(thing(&all, mug, false))).swap_remove(0).1;
         for (query, title) in [
             ("top", "Look from the top"),
             ("help", "Guide"),
@@ -291,7 +298,7 @@ mod tests {
         ] {
             assert_eq!(first(query), title, "{query}");
         }
-        let of = |query: &str| matches(query, &Layout::default(), Some((&all, mug)));
+        let of = |query: &str| matches(query, &Layout::default(), Some(thing(&all, mug, false)));
         assert!(of("delete").iter().any(|(action, _)| *action == Action::Remove(mug)));
         // Control: letters within words are found, too, at the end.
         assert_eq!(of("top").last().map(|(action, _)| action), Some(&Action::EndComparison));
@@ -301,7 +308,7 @@ mod tests {
     fn rows_of_the_selection_have_the_keys_of_the_menu() {
         let mut all = Identities::default();
         let mug = all.add(Level::Object, NO_IDENTITY, vec!["mug".into()]);
-        let keyed = |action| object_menu::keyed(&all, mug, &action);
+        let keyed = |action| object_menu::keyed(thing(&all, mug, false), &action);
         assert_eq!(keyed(Action::Hide(mug)), Some(Action::HideSelected));
         assert_eq!(keyed(Action::RenameThis(mug)), Some(Action::Rename));
         assert_eq!([keyed(Action::Transform(mug)), keyed(Action::Hide(mug + 1))], [None, None]);

@@ -26,6 +26,11 @@ impl Failure {
     pub fn new(message: impl Into<String>, remedy: impl Into<String>) -> Self {
         Self { message: message.into(), remedy: remedy.into(), is_refusal: false }
     }
+
+    /// Message and remedy in a line.
+    pub(crate) fn in_a_line(&self) -> String {
+        format!("{} {}", self.message, self.remedy)
+    }
 }
 
 /// End of a job without its outcome.

@@ -5,6 +5,7 @@
 //!
 //! A job ends in exactly one of finished, canceled or failed, panics included.
 
+pub(crate) mod comparing;
 pub(crate) mod control;
 pub(crate) mod event;
 pub(crate) mod failure;

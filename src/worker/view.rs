@@ -10,7 +10,7 @@ use super::failure::Failure;
 use super::observer::Repaint;
 use super::thread::panic_failure;
 use super::view_renderer::ViewRenderer;
-pub use super::view_request::{QualityBudget, SecondPicture, SkipPasses, ViewPicture, ViewRequest, ViewResult};
+pub use super::view_request::{PictureBeside, QualityBudget, SkipPasses, ViewPicture, ViewRequest, ViewResult};
 use super::{Slot, levels};
 use crate::jobs::query::ViewMaps;
 use crate::render::{DrawError, Renderer};
@@ -238,7 +238,7 @@ mod tests {
                     .expect("valid"),
                 mode: ViewMode::Rgb,
                 second: None,
-                comparison: None,
+                others: Vec::new(),
                 settings: RenderSettings::default(),
                 budget: QualityBudget::Full,
                 photo: None,

@@ -8,7 +8,7 @@ use super::failure::Failure;
 use super::levels::DetailLevels;
 use super::thread::panic_failure;
 use super::view_modes::{self, ViewMode};
-use super::view_request::{QualityBudget, SecondPicture, ViewPicture, ViewRequest, ViewResult};
+use super::view_request::{PictureBeside, QualityBudget, ViewPicture, ViewRequest, ViewResult};
 use crate::render::lod::{Cut, LodTree};
 use crate::render::{self, BackendChoice, DevicePicture, Frame, RenderSettings, Renderer};
 use crate::scene::Camera;
@@ -23,8 +23,8 @@ pub(super) struct ViewRenderer {
     pub(super) without_gpu: bool,
     /// Reason for which the CPU draws though there is a GPU.
     instead_of_gpu: Option<String>,
-    /// Draws the Gaussians of a second view, if they are others.
-    comparison: Option<Box<Self>>,
+    /// Draw the Gaussians of views beside, if they are others.
+    others: Vec<Self>,
     /// Cost of recent frames; `None` before the first.
     cost: Option<Speed>,
     pub(super) levels: DetailLevels,
@@ -56,7 +56,7 @@ impl ViewRenderer {
             renderer,
             without_gpu,
             instead_of_gpu,
-            comparison: None,
+            others: Vec::new(),
             cost: None,
             levels: DetailLevels::default(),
             cut: None,
@@ -106,22 +106,28 @@ impl ViewRenderer {
     }
 
     fn draw_seen(&mut self, request: &ViewRequest) -> ViewResult {
-        let shares = 1 + u8::from(request.follow) + u8::from(request.comparison.is_some());
+        let shares = 1 + u8::from(request.follow) + request.others.len() as u8;
         let camera = match self.tree(request).filter(|_| self.levels.pace.leaves_out()) {
             Some(_) => self.levels.pace.camera(&request.camera),
             None => self.fitting_camera(&request.camera, request.budget, shares),
         };
         let drawn = self.draw_at(request, camera.clone(), shares)?;
-        let Some((cloud, settings)) = request.comparison.clone() else {
-            self.comparison = None;
+        let without_gpu = self.without_gpu;
+        self.others.resize_with(request.others.len(), || Self::without_gpu(without_gpu));
+        if request.others.is_empty() {
             return Ok(Arc::new(drawn));
-        };
+        }
         let mode = request.second.unwrap_or(request.mode);
-        let other = ViewRequest { cloud, settings, mode, second: None, on_device: false, ..request.clone() };
-        let painter = self.comparison.get_or_insert_with(|| Box::new(Self::without_gpu(self.without_gpu)));
-        let _ = painter.sees(&other);
-        let ViewPicture { rgb, depth_range, psnr, .. } = painter.draw_at(&other, camera, shares)?;
-        Ok(Arc::new(ViewPicture { second: Some(SecondPicture { rgb, depth_range, psnr }), ..drawn }))
+        let mut beside = Vec::with_capacity(request.others.len());
+        for (painter, (cloud, settings)) in self.others.iter_mut().zip(request.others.clone()) {
+            let others = Vec::new();
+            let other =
+                ViewRequest { cloud, settings, mode, second: None, others, on_device: false, ..request.clone() };
+            let _ = painter.sees(&other);
+            let ViewPicture { rgb, depth_range, psnr, .. } = painter.draw_at(&other, camera.clone(), shares)?;
+            beside.push(PictureBeside { rgb, depth_range, psnr });
+        }
+        Ok(Arc::new(ViewPicture { beside, ..drawn }))
     }
 
     fn draw_at(&mut self, request: &ViewRequest, camera: Camera, shares: u8) -> Result<ViewPicture, Failure> {
@@ -163,7 +169,7 @@ impl ViewRenderer {
                 let paint = |mode| view_modes::paint(&frame, mode, request.photo.as_deref());
                 let second = request.second.map(|mode| {
                     let view_modes::Drawn { rgb, depth_range, psnr } = paint(mode);
-                    SecondPicture { rgb, depth_range, psnr }
+                    PictureBeside { rgb, depth_range, psnr }
                 });
                 let median_depth = |frame: Frame<f32>| Some(frame.median_depth).filter(|depth| !depth.is_empty());
                 (paint(request.mode), second, median_depth(*frame))
@@ -179,7 +185,7 @@ impl ViewRenderer {
             median_depth,
             depth_range: drawn.depth_range,
             psnr: drawn.psnr,
-            second,
+            beside: second.into_iter().collect(),
             secs,
             stages,
             paint_secs,
@@ -267,7 +273,7 @@ mod tests {
             renderer,
             without_gpu: true,
             instead_of_gpu: None,
-            comparison: None,
+            others: Vec::new(),
             cost,
             levels: DetailLevels::default(),
             cut: None,
@@ -284,7 +290,7 @@ mod tests {
             camera: Camera::look_at(DVec3::new(0.0, 0.0, -3.0), DVec3::ZERO, DVec3::NEG_Y, 0.8, 32, 24).expect("valid"),
             mode: ViewMode::Rgb,
             second: None,
-            comparison: None,
+            others: Vec::new(),
             settings: RenderSettings::default(),
             budget: QualityBudget::Moving,
             photo: None,
@@ -314,9 +320,9 @@ mod tests {
         }
         assert!(cpu.draw(&moving).expect("drawn").texture.is_none());
         // So are other Gaussians beside.
-        let comparison = Some((cloud, RenderSettings::default()));
-        let both = gpu.draw(&ViewRequest { comparison, ..moving }).expect("drawn");
-        assert!(!both.second.as_ref().expect("two").rgb.is_empty());
+        let others = vec![(cloud, RenderSettings::default()); 3];
+        let all = gpu.draw(&ViewRequest { others, ..moving }).expect("drawn");
+        assert!(all.beside.len() == 3 && all.beside.iter().all(|b| !b.rgb.is_empty()));
     }
 
     #[test]

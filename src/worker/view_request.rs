@@ -1,6 +1,6 @@
 //! Requests to the drawing thread, and its answers.
 //!
-//! Two views of a scene are two images of one frame and share its maps.
+//! Views beside the first are other images of one frame, which share its maps, or other Gaussians from the same camera.
 
 use std::sync::Arc;
 
@@ -20,10 +20,10 @@ pub struct ViewRequest {
     pub camera: Camera,
     /// Quantity to draw.
     pub mode: ViewMode,
-    /// Quantity of a second view beside it, if there is one.
+    /// Quantity of the views beside it, if there are any.
     pub second: Option<ViewMode>,
-    /// Gaussians of the second view, if they are others, and the settings to draw them with.
-    pub comparison: Option<(Versioned<GaussianCloud>, RenderSettings)>,
+    /// Gaussians of the views beside it, if they are others, and the settings to draw them with.
+    pub others: Vec<(Versioned<GaussianCloud>, RenderSettings)>,
     /// Degree of the colors, background, filter. Depth is drawn where it is needed.
     pub settings: RenderSettings,
     /// Time that the frame may take.
@@ -50,11 +50,11 @@ impl ViewRequest {
     /// Returns whether both ask for the same frame. Tickets do not count, nor does the device, which is the same as
     /// long as the window is.
     pub(crate) fn is_same_picture(&self, other: &Self) -> bool {
-        let comparison = |request: &Self| request.comparison.as_ref().map(|(cloud, _)| cloud.generation());
+        let others = |request: &Self| request.others.iter().map(|(cloud, _)| cloud.generation()).collect::<Vec<_>>();
         self.shows_same_scene(other)
             && self.camera == other.camera
             && (self.mode, self.second) == (other.mode, other.second)
-            && comparison(self) == comparison(other)
+            && others(self) == others(other)
             && self.settings == other.settings
             && (self.budget, self.skip, self.timed) == (other.budget, other.skip, other.timed)
             && self.photo.is_some() == other.photo.is_some()
@@ -107,9 +107,9 @@ impl QualityBudget {
     }
 }
 
-/// A drawn view as a second view shows it.
+/// Picture of a view beside the first.
 #[derive(Clone, Debug)]
-pub struct SecondPicture {
+pub struct PictureBeside {
     /// Row-major sRGB.
     pub rgb: Vec<[u8; 3]>,
     pub(crate) depth_range: Option<(f32, f32)>,
@@ -136,8 +136,8 @@ pub struct ViewPicture {
     pub(crate) depth_range: Option<(f32, f32)>,
     /// PSNR in dB against the photo, if the request had one.
     pub psnr: Option<f64>,
-    /// The same frame as the second view shows it, with its depths, if that was wanted.
-    pub second: Option<SecondPicture>,
+    /// Pictures of the views beside it: of the same frame, or one for each of the other Gaussians.
+    pub beside: Vec<PictureBeside>,
     /// Seconds that rendering took.
     pub secs: f64,
     /// The same by stage, where that is known.
@@ -151,12 +151,17 @@ pub struct ViewPicture {
 }
 
 impl ViewPicture {
+    /// The picture of the second view, if there is one.
+    pub fn second(&self) -> Option<&PictureBeside> {
+        self.beside.first()
+    }
+
     /// Its pixels on the host; those of the second view, if that is wanted and there is one.
     ///
     /// # Errors
     /// If reading them back from a device fails.
     pub(crate) fn pixels(&self, second: bool) -> Result<PhotoPixels, GpuError> {
-        let rgb = match (self.second.as_ref().filter(|_| second), &self.texture) {
+        let rgb = match (self.second().filter(|_| second), &self.texture) {
             (Some(second), _) => second.rgb.clone(),
             (None, Some(texture)) => texture.to_rgb8()?,
             (None, None) => self.rgb.clone(),

@@ -43,8 +43,18 @@ fn methods_without_language_are_shown_and_a_missing_encoder_is_named() {
     // The control: a method that knows a language needs its encoder.
     let done = run(["langsplat_v2/output", "saga"], &[]).fails_with(1);
     assert!(done.stderr.contains("clip-vit-b16") && done.stderr.contains("fmlgs models fetch"), "{}", done.stderr);
-    let done = run(silent, &["--decoder", "other=file"]).fails_with(2);
-    assert!(done.stderr.contains("'other'"), "{}", done.stderr);
+    for option in ["--decoder", "--encoder"] {
+        let done = run(silent, &[option, "other=file"]).fails_with(2);
+        assert!(done.stderr.contains("'other'") && done.stderr.contains(option), "{}", done.stderr);
+    }
+    // Another encoder is taken by name; its vectors have another width.
+    let other = format!("{}=demo", sample("langsplat_v2/output"));
+    let done = run(["langsplat_v2/output", "saga"], &["--encoder", &other]).ok();
+    for wanted in ["demo has 128 numbers", "compares 512", "--encoder"] {
+        assert!(done.stdout.contains(wanted), "{wanted}: {}", done.stdout);
+    }
+    let done = run(silent, &["--encoder", &format!("{}=demo", sample("saga"))]).fails_with(1);
+    assert!(done.stderr.contains("knows no language") && done.stderr.contains("--encoder"), "{}", done.stderr);
     let done = run(["gaussian_grouping", "nowhere"], &[]).fails_with(1);
     assert!(done.stderr.contains("nowhere"), "{}", done.stderr);
     run(silent, &["--arrays"]).fails_with(2);

@@ -137,3 +137,88 @@ fn what_a_result_cannot_do_is_said_with_what_can() {
     let refused = run(&["import", &at("scene"), "--out", &at("again")]).fails_with(2).stderr;
     assert!(refused.contains("already") && !folder.path().join("again").exists(), "{refused}");
 }
+
+/// Numbers of a NumPy file of 32-bit floating point, and their shape.
+fn array(path: &str) -> (Vec<u64>, Vec<f32>) {
+    let bytes = std::fs::read(path).expect(path);
+    let file = npyz::NpyFile::new(&bytes[..]).expect("an array");
+    (file.shape().to_vec(), file.into_vec().expect("numbers"))
+}
+
+/// Largest difference of numbers.
+fn apart(a: &[f32], b: &[f32]) -> f32 {
+    assert_eq!(a.len(), b.len());
+    a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max)
+}
+
+#[test]
+fn phrases_are_answered_by_vectors_of_a_file_without_an_encoder() {
+    let folder = folder();
+    let at = |name: &str| folder.path().join(name).to_str().expect("UTF-8").to_owned();
+    let (language, texts) = (sample("langsplat/output"), sample("scene/texts.npy"));
+    let run = |more: &[&str]| -> Done {
+        let mut command = command(&[&["query", &*language, "kettle", "--vectors", &*texts][..], more].concat());
+        command.env("FMLGS_MODELS", folder.path().join("no-models")).output().expect("runs").into()
+    };
+    let answer = run(&["--level", "2", "--out", &at("answer"), "--arrays", "--json"]).ok().json();
+    assert_eq!((&answer["level"], &answer["method"]), (&"medium".into(), &"LangSplat".into()));
+    let (shape, relevancy) = array(&at("answer/relevancy.npy"));
+    assert_eq!(shape, [18, 24]);
+    let wanted = |level: u32| array(&sample(&format!("langsplat/expected/relevancy_pixels_{level}.npy"))).1;
+    assert!(apart(&relevancy, &wanted(2)) < 1e-4 && apart(&relevancy, &wanted(1)) > 1e-3, "and another level");
+    let names = |folder: &str| {
+        let files = files(Path::new(&at(folder))).into_iter();
+        files.map(|(path, _)| path.file_name().expect("a name").to_string_lossy().into_owned()).collect::<Vec<_>>()
+    };
+    assert_eq!(names("answer"), ["mask-common-rule.npy", "mask-own-rule.npy", "relevancy.npy"]);
+    run(&["--out", &at("pictures")]).ok();
+    assert_eq!(names("pictures"), ["mask-common-rule.png", "mask-own-rule.png", "relevancy.png"]);
+    run(&["--arrays"]).fails_with(2);
+    // Other vectors, and a scene that compares none.
+    std::fs::write(at("none.npy"), "no array").expect("written");
+    let none = at("none.npy");
+    let refused = fmlgs(&["query", &language, "kettle", "--vectors", &none]).fails_with(1).stderr;
+    assert!(refused.contains("none.npy"), "{refused}");
+    let refused = fmlgs(&["query", &sample("gaussian_grouping"), "class 3", "--vectors", &texts]).fails_with(2).stderr;
+    assert!(refused.contains("--vectors"), "{refused}");
+}
+
+#[test]
+fn objects_have_relevancy_and_both_masks_as_files() {
+    let folder = folder();
+    let at = |name: &str| folder.path().join(name).to_str().expect("UTF-8").to_owned();
+    let ask = |text: &str, out: &str| {
+        let run = sample("gaussian_grouping");
+        fmlgs(&["query", &run, text, "--out", &at(out), "--arrays", "--json"]).ok().json()
+    };
+    let (seven, three) = (ask("class 7", "seven"), ask("class 3", "three"));
+    assert_eq!(seven["own_rule"]["pixels"], seven["pixels"]);
+    assert!(seven["common_rule"]["rule"].as_str().is_some_and(|rule| rule.contains("20 %")), "{seven}");
+    let read = |out: &str| array(&at(&format!("{out}/relevancy.npy"))).1;
+    assert!(apart(&read("seven"), &read("three")) > 0.1, "another object, {three}");
+    let plain = fmlgs(&["query", &sample("gaussian_grouping"), "class 7", "--json"]).ok().json();
+    assert!(plain["common_rule"].is_null() && plain["pixels"] == seven["pixels"], "the control");
+}
+
+#[test]
+fn features_of_gaussians_are_written_as_arrays() {
+    let folder = folder();
+    let at = |name: &str| folder.path().join(name).to_str().expect("UTF-8").to_owned();
+    let (language, codes) = (sample("langsplat/output"), at("codes.npy"));
+    let facts = fmlgs(&["features", &language, "--level", "large", "--codes", &codes, "--json"]).ok().json();
+    assert_eq!(
+        (&facts["level"], &facts["gaussians"], &facts["code_numbers"]),
+        (&"large".into(), &32.into(), &3.into())
+    );
+    let wanted = |level: u32| array(&sample(&format!("langsplat/expected/codes_{level}.npy")));
+    assert_eq!(array(&codes), wanted(3));
+    assert_ne!(array(&codes), wanted(1), "the control");
+    let told = fmlgs(&["features", &sample("occams_lgs"), "--level", "2"]).ok().stdout;
+    assert!(told.contains("Gaussians of its own") && told.contains("clip-vit-b16"), "{told}");
+    let refused = fmlgs(&["features", &language, "--codes", &at("a.npy"), "--embeddings", &at("a.npy")]).fails_with(2);
+    assert!(refused.stderr.contains("--embeddings"), "{}", refused.stderr);
+    let refused = fmlgs(&["features", &sample("3dgs"), "--codes", &at("a.npy")]).fails_with(2).stderr;
+    assert!(refused.contains("no result of another method") && !Path::new(&at("a.npy")).exists(), "{refused}");
+    let refused = fmlgs(&["features", &sample("saga"), "--embeddings", &at("a.npy")]).fails_with(2).stderr;
+    assert!(refused.contains("SAGA knows no language"), "{refused}");
+}

@@ -9,6 +9,15 @@ from sample import Sample
 from scene import DIMENSION
 
 
+def save_classes(s, features, weight, bias):
+    """Gaussian Grouping's Gaussians with features, and its classifier."""
+    s.model_folder(extra=f", num_classes={len(bias)}, object_path='object_mask'")
+    where = ("point_cloud", "iteration_30000")
+    s.ply(*where, "point_cloud.ply", after=[([f"obj_dc_{i}" for i in range(features.shape[1])], features)])
+    state = {"weight": torch.from_numpy(weight)[:, :, None, None], "bias": torch.from_numpy(bias)}
+    torch_files.save(state, s.path(*where, "classifier.pth"))
+
+
 def gaussian_grouping(root, scene):
     """Gaussian Grouping: 16 numbers a Gaussian and a linear classifier of 256 classes."""
     s = Sample(root, "gaussian_grouping", scene)
@@ -19,11 +28,7 @@ def gaussian_grouping(root, scene):
     weight[classes, np.arange(4)] += 4
     features, weight = features.astype(np.float32), weight.astype(np.float32)
     bias = r.normal(0, 0.1, 256).astype(np.float32)
-    s.model_folder(extra=", num_classes=256, object_path='object_mask'")
-    where = ("point_cloud", "iteration_30000")
-    s.ply(*where, "point_cloud.ply", after=[([f"obj_dc_{i}" for i in range(16)], features)])
-    state = {"weight": torch.from_numpy(weight)[:, :, None, None], "bias": torch.from_numpy(bias)}
-    torch_files.save(state, s.path(*where, "classifier.pth"))
+    save_classes(s, features, weight, bias)
     logits = lambda o: o @ weight.T.astype(np.float64) + bias  # noqa: E731
     sure = softmax(logits(features.astype(np.float64)))
     rendered = s.blended(features)

@@ -18,6 +18,32 @@ def _relevancies(s, suffix, gaussians, pixels, texts):
         s.expect(f"relevancy_pixels{suffix}", relevancy(pixels, texts))
 
 
+def save_autoencoder(s, name, encoder, norms, decoder):
+    """LangSplat's autoencoder of a scene: pairs of weight and bias of the encoder's and decoder's linear layers, and
+    weight, bias, mean and variance of the normalization before each of the encoder's but the first."""
+    state, of = {}, lambda array: torch.from_numpy(np.asarray(array, np.float32))
+    for i, (weight, bias) in enumerate(encoder):
+        # Linear, then BatchNorm and ReLU before the next one.
+        if i:
+            scale, shift, mean, variance = norms[i - 1]
+            state |= {
+                f"encoder.{3 * i - 2}.weight": of(scale), f"encoder.{3 * i - 2}.bias": of(shift),
+                f"encoder.{3 * i - 2}.running_mean": of(mean), f"encoder.{3 * i - 2}.running_var": of(variance),
+                f"encoder.{3 * i - 2}.num_batches_tracked": torch.tensor(100),
+            }
+        state |= {f"encoder.{3 * i}.weight": of(weight), f"encoder.{3 * i}.bias": of(bias)}
+    for i, (weight, bias) in enumerate(decoder):
+        state |= {f"decoder.{2 * i}.weight": of(weight), f"decoder.{2 * i}.bias": of(bias)}
+    torch_files.save(state, s.path("autoencoder", "ckpt", name, "best_ckpt.pth"))
+
+
+def save_level(s, name, level, codes):
+    """LangSplat's checkpoint of a level, 1 to 3, with codes of three numbers."""
+    feature, folder = parameter(codes), f"{name}_{level}"
+    s.model_folder("output", folder, extra=f", feature_level={level}, language_features_name='language_features_dim3'")
+    s.checkpoint(s.plain_parts(), [feature], [("language_feature", feature, 0.0025)], "output", folder, "chkpnt30000.pth")
+
+
 def langsplat(root, scene):
     """LangSplat: 13-tuples of three levels, an autoencoder. The decoder is narrower than the official one (9 hidden
     numbers instead of up to 256), so that the file is small; its depth and names are the official ones."""
@@ -42,29 +68,12 @@ def langsplat(root, scene):
         return hide(codes) @ weight.T + bias
 
     encoder = [DIMENSION, hidden, hidden, hidden, hidden, 3]
-    state = {}
-    for i, (a, b) in enumerate(zip(encoder, encoder[1:])):
-        # Linear, then BatchNorm and ReLU before the next one.
-        if i:
-            state |= {
-                f"encoder.{3 * i - 2}.weight": torch.ones(a), f"encoder.{3 * i - 2}.bias": torch.zeros(a),
-                f"encoder.{3 * i - 2}.running_mean": torch.zeros(a), f"encoder.{3 * i - 2}.running_var": torch.ones(a),
-                f"encoder.{3 * i - 2}.num_batches_tracked": torch.tensor(100),
-            }
-        state[f"encoder.{3 * i}.weight"] = torch.from_numpy(r.normal(0, 0.1, (b, a)).astype(np.float32))
-        state[f"encoder.{3 * i}.bias"] = torch.zeros(b)
-    for i, (weight, bias) in enumerate(decoder):
-        state[f"decoder.{2 * i}.weight"] = torch.from_numpy(weight.astype(np.float32))
-        state[f"decoder.{2 * i}.bias"] = torch.from_numpy(bias.astype(np.float32))
-    torch_files.save(state, s.path("autoencoder", "ckpt", "made_up", "best_ckpt.pth"))
+    layers = [(r.normal(0, 0.1, (b, a)), np.zeros(b)) for a, b in zip(encoder, encoder[1:])]
+    norms = [(np.ones(a), np.zeros(a), np.zeros(a), np.ones(a)) for a in encoder[1:-1]]
+    save_autoencoder(s, "made_up", layers, norms, decoder)
     for level in (1, 2, 3):
         codes = (centers[scene.cluster] + r.normal(0, 0.05 * level, (len(scene.xyz), 3))).astype(np.float32)
-        feature = parameter(codes)
-        folder = f"made_up_{level}"
-        s.model_folder("output", folder, extra=f", feature_level={level}, language_features_name='language_features_dim3'")
-        s.checkpoint(
-            s.plain_parts(), [feature], [("language_feature", feature, 0.0025)], "output", folder, "chkpnt30000.pth"
-        )
+        save_level(s, "made_up", level, codes)
         s.expect(f"codes_{level}", codes)
         rendered = s.blended(unit(codes, 1e-9))
         s.expect(f"codes_pixels_{level}", rendered)

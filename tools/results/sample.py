@@ -1,11 +1,13 @@
 """What the samples share: folders, the `.ply` of 3DGS, the checkpoint's tuple, the expected arrays."""
 
+import json
+
 import numpy as np
 from plyfile import PlyData, PlyElement
 
 import reference
 import torch_files
-from scene import cameras_json, cfg_args
+from scene import cfg_args
 from torch_files import parameter
 
 
@@ -38,8 +40,8 @@ class Sample:
 
     def model_folder(self, *parts, degree=3, extra=""):
         """The files that every training of 3DGS leaves beside its Gaussians."""
-        self.text(cfg_args(self.name, degree, extra), *parts, "cfg_args")
-        self.text(cameras_json(self.scene), *parts, "cameras.json")
+        self.text(cfg_args(self.name, self.scene.source, degree, extra), *parts, "cfg_args")
+        self.text(json.dumps(self.scene.photos()), *parts, "cameras.json")
 
     def ply(self, *parts, rows=None, before=(), after_harmonics=(), after_opacity=(), after=(), last=(), scales=3,
             harmonics=True):

@@ -1,7 +1,5 @@
 """The made-up scene that all samples show: 32 Gaussians in four clusters, two cameras, a phrase."""
 
-import json
-
 import numpy as np
 
 COUNT = 32
@@ -24,6 +22,7 @@ class Scene:
         centers = np.array([[-0.9, -0.5, 0.0], [0.9, -0.4, 0.2], [-0.5, 0.6, -0.2], [0.8, 0.6, 0.1]])
         self.cluster = np.arange(COUNT) % 4
         f32 = lambda a: a.astype(np.float32)  # noqa: E731
+        self.source = "data/made_up"
         self.xyz = f32(centers[self.cluster] + r.normal(0, 0.2, (COUNT, 3)))
         self.log_scale = f32(np.log(0.14) + r.normal(0, 0.3, (COUNT, 3)))
         self.rotation = f32(_unit(r.normal(size=(COUNT, 4))) * r.uniform(0.5, 2.0, (COUNT, 1)))
@@ -49,6 +48,13 @@ class Scene:
         """Two cameras: world_from_camera (columns right, down, forward) and center."""
         return [look_at([0.0, 0.0, -3.2]), look_at([1.6, -0.7, -2.8])]
 
+    def photos(self):
+        """The cameras as entries of `cameras.json`."""
+        return [
+            camera_entry(i, f"view_{i}", (WIDTH, HEIGHT), (FOCAL, FOCAL), camera)
+            for i, camera in enumerate(self.cameras())
+        ]
+
 
 def look_at(center):
     """Camera at `center` that looks at the origin, y down."""
@@ -59,20 +65,18 @@ def look_at(center):
     return np.stack([right, np.cross(forward, right), forward], axis=1), center
 
 
-def cameras_json(scene):
-    """`cameras.json` as 3DGS writes it."""
-    entries = []
-    for i, (rotation, center) in enumerate(scene.cameras()):
-        entries.append({
-            "id": i, "img_name": f"view_{i}", "width": WIDTH, "height": HEIGHT,
-            "position": center.tolist(), "rotation": rotation.tolist(), "fy": FOCAL, "fx": FOCAL,
-        })
-    return json.dumps(entries)
+def camera_entry(number, name, size, focal, camera):
+    """An entry of `cameras.json` as 3DGS writes it; `camera` is world_from_camera and center."""
+    rotation, center = camera
+    return {
+        "id": number, "img_name": name, "width": size[0], "height": size[1],
+        "position": center.tolist(), "rotation": rotation.tolist(), "fy": focal[1], "fx": focal[0],
+    }
 
 
-def cfg_args(name, degree=3, extra=""):
+def cfg_args(name, source="data/made_up", degree=3, extra=""):
     """`cfg_args` as 3DGS writes it: one line of Python."""
     return (
         f"Namespace(data_device='cuda', eval=False, images='images', model_path='output/{name}', resolution=-1, "
-        f"sh_degree={degree}, source_path='data/made_up', white_background=False{extra})"
+        f"sh_degree={degree}, source_path={source!r}, white_background=False{extra})"
     )

@@ -95,11 +95,18 @@ pub(super) const RULES: &[Rule] = &[
         &["deviation", "canonical", "temperature"],
         |g| when(g.is("by", "names"), "with --by names, which compares no embeddings"),
     ),
-    rule(&["query"], &["relevancy"], |g| when(!g.has("heat"), "without --heat")),
+    rule(&["query"], &["relevancy"], |g| when(!g.has_any(&["heat", "out"]), "without --heat or --out")),
+    rule(&["query"], &["arrays"], |g| when(!g.has("out"), "without --out")),
     rule(&["segment", "eval", "batch eval", "report"], &["relevancy"], |_| Some("here: no heat map is drawn")),
     rule(&["query"], &["views", "truth", "export"], |g| when(!g.has("phrases"), "without --phrases")),
     rule(&["query"], &["heat"], |g| {
         when(g.path("heat") == g.path("mask"), "on the file of --mask: give it a file of its own")
+    }),
+    rule(&["features"], &["embeddings"], |g| {
+        when(
+            g.has("codes") && g.path("embeddings") == g.path("codes"),
+            "on the file of --codes: give it a file of its own",
+        )
     }),
     // Objects as Gaussians.
     rule(&["segment"], &["format", "masks", "views", "max_side"], |g| when(!g.has("all"), "without --all")),

@@ -3,17 +3,15 @@
 use serde_json::{Value, json};
 
 use super::QueryArgs;
+use super::out::OutFiles;
 use crate::cli::{CliError, output, view};
-use crate::io::results::Method;
+use crate::io::results::{Method, MethodResult};
 use crate::jobs::ask_result::{self, ResultAnswer};
-use crate::jobs::{Scene, export, query, render};
+use crate::jobs::{Scene, query, render};
 use crate::math::format::{count, things};
 use crate::pipeline::semantics::query::foreign::own_rules::ForeignMask;
 use crate::pipeline::semantics::query::recipe::QueryConfig;
 use crate::scene::{LevelFilter, Mask};
-
-/// Files of --out.
-const FILES: [&str; 3] = ["relevancy.png", "mask-own-rule.png", "mask-common-rule.png"];
 
 /// Refuses options that mean nothing for a result.
 fn check(args: &QueryArgs, method: Method) -> Result<(), CliError> {
@@ -35,18 +33,17 @@ fn check(args: &QueryArgs, method: Method) -> Result<(), CliError> {
 
 pub(super) fn run(args: &QueryArgs, scene: &Scene, method: Method) -> Result<(), CliError> {
     check(args, method)?;
-    if let Some(folder) = &args.out {
-        export::check_folder(folder, &scene.reads())?;
-        let place = |file| folder.join(file);
-        FILES.map(place).iter().try_for_each(|file| export::check(file, &query::MAP_ENDINGS, &scene.reads()))?;
-    }
+    let out = OutFiles::of(args, scene)?;
     let text = args.text.as_deref().unwrap_or_default();
     let camera = view::choose(args.camera.as_deref(), scene)?.limited_to(args.max_side);
     render::check_room(camera.width_px, camera.height_px)?;
     let asked = ask_result::open(scene, &args.result.options())?;
     // A decoder that an option names can tell another method than the files alone.
     let method = asked.result.method;
-    let vectors = ask_result::encoded(method, text)?;
+    let vectors = match &args.vectors {
+        Some(file) => ask_result::stored_vectors(file)?,
+        None => ask_result::encoded(&asked.result, text)?,
+    };
     let level = args.level.as_deref().map(|wanted| ask_result::level_of(&asked.result, wanted)).transpose()?;
     let answer = ask_result::ask(&asked, &camera, &vectors, level)?;
     let empty = Mask::empty(camera.width_px as usize, camera.height_px as usize);
@@ -54,21 +51,16 @@ pub(super) fn run(args: &QueryArgs, scene: &Scene, method: Method) -> Result<(),
     if let Some(path) = &args.mask {
         query::write_mask(path, &answer.common.mask)?;
     }
-    let heat = (&*scene.cloud, &scene.settings);
     if let Some(path) = &args.heat {
-        query::write_heat(path, heat, &camera, &answer.relevancy)?;
+        query::write_heat(path, (&scene.cloud, &scene.settings), &camera, &answer.relevancy)?;
     }
-    if let Some(folder) = &args.out {
-        export::make_folder(folder)?;
-        query::write_heat(&folder.join(FILES[0]), heat, &camera, &answer.relevancy)?;
-        if answer.own.is_ok() {
-            query::write_mask(&folder.join(FILES[1]), own)?;
-        }
-        query::write_mask(&folder.join(FILES[2]), &answer.common.mask)?;
+    if let Some(out) = &out {
+        let own = answer.own.as_ref().ok().map(|own| &own.mask);
+        out.write(scene, &camera, &answer.relevancy, [own, Some(&answer.common.mask)])?;
     }
     let names: Vec<&str> = asked.result.levels.iter().map(|level| level.name.as_str()).collect();
     match args.json {
-        true => output::print_json(&as_json(text, method, &names, &answer))?,
+        true => output::print_json(&as_json(text, &asked.result, &names, &answer))?,
         false => output::print(&in_words(method, &names, &answer))?,
     }
     if answer.common.mask.is_empty() && own.is_empty() {
@@ -78,12 +70,12 @@ pub(super) fn run(args: &QueryArgs, scene: &Scene, method: Method) -> Result<(),
     Ok(())
 }
 
-fn as_json(text: &str, method: Method, names: &[&str], answer: &ResultAnswer) -> Value {
+fn as_json(text: &str, result: &MethodResult, names: &[&str], answer: &ResultAnswer) -> Value {
     let mask = |m: &ForeignMask| json!({ "rule": m.rule, "level": names[m.level], "pixels": m.mask.area() });
     json!({
         "query": text,
-        "method": method.name(),
-        "encoder": method.encoder(),
+        "method": result.method.name(),
+        "encoder": result.encoder,
         "level": names[answer.level],
         "levels": names,
         "relevancy": answer.relevancy.iter().copied().fold(0.0, f32::max),

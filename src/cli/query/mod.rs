@@ -1,6 +1,7 @@
 //! `fmlgs query`: where in a view is what is asked for.
 
 mod foreign;
+mod out;
 mod phrases;
 
 use std::path::PathBuf;
@@ -8,12 +9,13 @@ use std::time::Instant;
 
 use serde_json::{Value, json};
 
+use self::out::OutFiles;
 use super::recipe::RecipeArgs;
 use super::result_args::ResultArgs;
 use super::scene_args::open_scene;
 use super::{CliError, number, output, view};
 use crate::io::results::Method;
-use crate::jobs::query::{self, QueryRequest, QueryResult};
+use crate::jobs::query::{self, QueryRequest, QueryResult, RuledMask};
 use crate::jobs::{export, render};
 use crate::pipeline::semantics::query::answer::Basis;
 use crate::pipeline::semantics::query::language::slips::mended_text;
@@ -37,6 +39,7 @@ const OFFERED: usize = 3;
     fmlgs query scene/ lamp --kind object --json\n  \
     fmlgs query scene/ \"bear nose\" --recipe paper --heat heat.png\n  \
     fmlgs query langsplat/output/ramen \"chopsticks\" --level small --out answer/\n  \
+    fmlgs query langsplat/output/ramen \"chopsticks\" --vectors embeddings.npy --out answer/ --arrays\n  \
     fmlgs query scene/ --phrases words.txt --views all --export masks/ --truth true_masks/")]
 pub(crate) struct QueryArgs {
     /// Trained scene with objects and parts ('fmlgs preprocess'), or a result of another method
@@ -74,6 +77,12 @@ pub(crate) struct QueryArgs {
     /// Write the relevancy of every pixel: .png over the image, or .npy of numbers from 0 to 1
     #[arg(long)]
     heat: Option<PathBuf>,
+    /// Write the relevancy and the masks by the own rule and by the common one into this folder, as .png
+    #[arg(long, value_name = "FOLDER", conflicts_with = "phrases")]
+    out: Option<PathBuf>,
+    /// Write arrays (.npy) instead of pictures into the folder of --out
+    #[arg(long, requires = "out")]
+    arrays: bool,
     /// Print one JSON document
     #[arg(long)]
     json: bool,
@@ -82,9 +91,9 @@ pub(crate) struct QueryArgs {
     /// Level of a result of another method, by name or by number from 1 [default: that of the largest relevancy]
     #[arg(long, help_heading = "Results of other methods")]
     level: Option<String>,
-    /// Write the relevancy and both masks of a result of another method into this folder
-    #[arg(long, value_name = "FOLDER", help_heading = "Results of other methods")]
-    out: Option<PathBuf>,
+    /// Embeddings in place of an encoder's: .npy with a row for the phrase and one for each canonical phrase
+    #[arg(long, value_name = "FILE", help_heading = "Results of other methods")]
+    vectors: Option<PathBuf>,
     #[command(flatten)]
     result: ResultArgs,
 }
@@ -98,14 +107,15 @@ pub(crate) fn run(args: QueryArgs, quiet: bool) -> Result<(), CliError> {
     if let Some(method) = scene.method.filter(|m| scene.folder.is_none() && has_embeddings(m)) {
         return foreign::run(&args, &scene, method);
     }
-    if args.level.is_some() || args.out.is_some() || args.result.is_given() {
-        let text = "are for results of other methods with language; this is none (--mask and --heat write files)";
-        return Err(CliError::Usage(format!("--level, --out, --decoder and --top-k {text}")));
+    if args.level.is_some() || args.vectors.is_some() || args.result.is_given() {
+        let text = "are for results of other methods with language; this is none";
+        return Err(CliError::Usage(format!("--level, --vectors, --decoder, --top-k and --encoder {text}")));
     }
     let map = scene.semantics()?;
     if let Some(list) = &args.phrases {
         return phrases::run(&args, list, &scene, map, quiet);
     }
+    let out = OutFiles::of(&args, &scene)?;
     let text = args.text.as_deref().unwrap_or_default();
     let camera = view::choose(args.camera.as_deref(), &scene)?.limited_to(args.max_side);
     render::check_room(camera.width_px, camera.height_px)?;
@@ -120,13 +130,24 @@ pub(crate) fn run(args: QueryArgs, quiet: bool) -> Result<(), CliError> {
         let relevancy = result.answered.heat(&result.maps.identities);
         query::write_heat(path, (&scene.cloud, &scene.settings), &camera, &relevancy)?;
     }
-    if args.mask.is_some() || args.heat.is_some() {
+    let common = out.as_ref().map(|_| result.common_mask(&map));
+    if let (Some(out), Some(common)) = (&out, &common) {
+        let relevancy = result.answered.heat(&result.maps.identities);
+        out.write(&scene, &camera, &relevancy, [Some(&result.mask), Some(&common.mask)])?;
+    }
+    if args.mask.is_some() || args.heat.is_some() || out.is_some() {
         result.answered.stages.draw = ms_since(drawing_since);
     }
-    print_answer(&args, text, &map, &result)
+    print_answer(&args, text, &map, &result, common.as_ref())
 }
 
-fn print_answer(args: &QueryArgs, text: &str, map: &SemanticMap, result: &QueryResult) -> Result<(), CliError> {
+fn print_answer(
+    args: &QueryArgs,
+    text: &str,
+    map: &SemanticMap,
+    result: &QueryResult,
+    common: Option<&RuledMask>,
+) -> Result<(), CliError> {
     let QueryResult { answered, reading, mask, ignored_words: ignored, unexplained_words, query_ms, .. } = result;
     let full_name = |hit: &Hit| map.identities.full_name(hit.identity);
     let basis = if answered.basis == Basis::Names { "names" } else { "looks" };
@@ -152,6 +173,8 @@ fn print_answer(args: &QueryArgs, text: &str, map: &SemanticMap, result: &QueryR
             "hits": hits.iter().map(hit).collect::<Vec<_>>(),
             "looks_like": answered.alike.iter().map(hit).collect::<Vec<_>>(),
             "pixels": mask.area(),
+            "own_rule": common.map(|_| json!({ "rule": query::BY_IDENTITY, "pixels": mask.area() })),
+            "common_rule": common.map(|m| json!({ "rule": m.rule, "level": m.level, "pixels": m.mask.area() })),
             "in_view": !mask.is_empty(),
             "empty": is_empty,
             "said": understood.and_then(|u| u.said.as_ref()),

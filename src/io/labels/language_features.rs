@@ -13,9 +13,8 @@ use super::nested::{NO_MASK, nested};
 use super::sheet::AsLoaded;
 use super::{Region, Sheet, entries};
 use crate::io::results::numpy::{self, NumpyArray};
-use crate::io::results::{Decoder, DecoderStep, LinearLayer, autoencoder};
+use crate::io::results::{Decoder, autoencoder};
 use crate::io::{IoError, files};
-use crate::math::vector::unit;
 use crate::scene::Mask;
 
 /// Name of the folder in a data set.
@@ -246,27 +245,7 @@ fn rows(array: &NumpyArray, path: &Path, masks: usize, decoder: Option<&Decoder>
         return Err(bad(format!("vector {} is not finite", i / dimension)));
     }
     match decoder {
-        Some(decoder) => Ok(values.chunks(dimension).flat_map(|code| decoded(decoder, code)).collect()),
+        Some(decoder) => Ok(values.chunks(dimension).flat_map(|code| decoder.embedding(code)).collect()),
         None => Ok(values),
     }
-}
-
-/// Decodes a compressed vector to one of length 1.
-fn decoded(decoder: &Decoder, code: &[f32]) -> Vec<f32> {
-    let (before, last) = decoder.split();
-    let linear = |layer: &LinearLayer, values: &[f32]| -> Vec<f32> {
-        let dot = |k: usize| layer.weights(k).iter().zip(values).map(|(w, v)| w * v).sum::<f32>();
-        (0..layer.outputs()).map(|k| dot(k) + layer.bias()[k]).collect()
-    };
-    let mut values = code.to_vec();
-    for step in before {
-        match step {
-            DecoderStep::Linear(layer) => values = linear(layer, &values),
-            DecoderStep::Relu => values.iter_mut().for_each(|v| *v = v.max(0.0)),
-            // The autoencoder has none of these.
-            DecoderStep::Unit | DecoderStep::Softmax | DecoderStep::Keep | DecoderStep::AddKept => {}
-        }
-    }
-    let values = last.map_or(values.clone(), |layer| linear(layer, &values));
-    unit(&values).unwrap_or(values)
 }

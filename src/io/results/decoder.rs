@@ -4,6 +4,7 @@
 use std::path::Path;
 
 use crate::io::IoError;
+use crate::math::vector::{dot, unit};
 
 /// Most numbers of a layer's input or output.
 const MOST_NUMBERS: usize = 1 << 14;
@@ -81,6 +82,32 @@ impl LinearLayer {
     pub fn bias(&self) -> &[f32] {
         &self.bias
     }
+
+    fn apply(&self, values: &[f32]) -> Vec<f32> {
+        (0..self.outputs).map(|k| dot(self.weights(k), values) + self.bias[k]).collect()
+    }
+}
+
+impl DecoderStep {
+    /// Applies the step; `kept` has the numbers that were remembered last.
+    fn apply(&self, values: &[f32], kept: &mut Vec<f32>) -> Vec<f32> {
+        match self {
+            Self::Linear(layer) => layer.apply(values),
+            Self::Relu => values.iter().map(|v| v.max(0.0)).collect(),
+            Self::Unit => unit(values).unwrap_or_else(|| values.to_vec()),
+            Self::Softmax => {
+                let most = values.iter().copied().fold(f32::NEG_INFINITY, f32::max);
+                let shares: Vec<f32> = values.iter().map(|v| (v - most).exp()).collect();
+                let sum: f32 = shares.iter().sum();
+                shares.into_iter().map(|v| v / sum).collect()
+            }
+            Self::Keep => {
+                *kept = values.to_vec();
+                values.to_vec()
+            }
+            Self::AddKept => values.iter().zip(&*kept).map(|(v, kept)| v + kept).collect(),
+        }
+    }
 }
 
 /// Steps from a code to an embedding, none if codes are embeddings.
@@ -129,6 +156,13 @@ impl Decoder {
         self.outputs
     }
 
+    /// Embedding of a code, of unit length; zeros if it has no direction.
+    pub fn embedding(&self, code: &[f32]) -> Vec<f32> {
+        let mut kept = Vec::new();
+        let whole = self.steps.iter().fold(code.to_vec(), |values, step| step.apply(&values, &mut kept));
+        unit(&whole).unwrap_or_else(|| vec![0.0; self.outputs])
+    }
+
     /// Steps before the last linear layer, and that layer, if it is the last step.
     pub fn split(&self) -> (&[DecoderStep], Option<&LinearLayer>) {
         match self.steps.split_last() {
@@ -166,5 +200,27 @@ mod tests {
         let book = LinearLayer::of_codebook([2, 3], &[1.0, 2.0, 3.0, 4.0, 5.0, 6.0], path).expect("fits");
         assert_eq!((book.inputs(), book.weights(0), book.weights(2)), (2, &[1.0, 4.0][..], &[3.0, 6.0][..]));
         assert!(LinearLayer::of_codebook([usize::MAX, 3], &[1.0], path).is_err());
+    }
+
+    #[test]
+    fn every_step_is_applied_in_its_order() {
+        let path = Path::new("x.pth");
+        let layer = LinearLayer::new([2, 2], vec![1.0, 0.0, 0.0, -1.0], Some(vec![0.0, 1.0]), path).expect("fits");
+        let made = |steps: Vec<DecoderStep>| Decoder::new(2, steps, path).expect("fits").embedding(&[3.0, 4.0]);
+        let near = |found: Vec<f32>, wanted: [f32; 2]| found.iter().zip(wanted).all(|(a, b)| (a - b).abs() < 1e-6);
+        assert!(near(made(vec![]), [0.6, 0.8]));
+        // (3, -3), then (3, 0).
+        assert!(near(made(vec![DecoderStep::Linear(layer.clone()), DecoderStep::Relu]), [1.0, 0.0]));
+        // (3, 4), then (3, -3): the control, another order.
+        let half = 0.5_f32.sqrt();
+        assert!(near(made(vec![DecoderStep::Relu, DecoderStep::Linear(layer.clone())]), [half, -half]));
+        // (0.6, 0.8), then (0.6, 0.2).
+        let length = 0.4_f32.sqrt();
+        assert!(near(made(vec![DecoderStep::Unit, DecoderStep::Linear(layer)]), [0.6 / length, 0.2 / length]));
+        // Shares 1 to e.
+        let (one, e) = (1.0, 1.0_f32.exp());
+        let length = (one + e * e).sqrt();
+        assert!(near(made(vec![DecoderStep::Softmax]), [one / length, e / length]));
+        assert_eq!(Decoder::none(2).embedding(&[0.0, 0.0]), [0.0, 0.0], "no direction");
     }
 }

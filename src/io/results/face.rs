@@ -1,6 +1,7 @@
 //! The common shape of other methods' results: Gaussians, and for each level the values from which a phrase, a click or
 //! a number is answered.
 
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -11,6 +12,7 @@ use super::sparse::SparseRows;
 use crate::io::trained::SceneCamera;
 use crate::io::{IoError, gs_output};
 use crate::scene::GaussianCloud;
+use crate::scene::identity::whole_names::key;
 
 /// Method that made a result.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, strum::VariantArray)]
@@ -102,8 +104,7 @@ impl Method {
         }
     }
 
-    /// Text encoder whose embeddings its values are compared with; `None` if it knows no language, or its encoder is
-    /// not in the list of models.
+    /// Text encoder of its authors; `None` if it knows no language, or if that encoder is not in the list of models.
     pub fn encoder(self) -> Option<&'static str> {
         match self {
             Self::GaussianGrouping | Self::OmniSeg3d | Self::Saga | Self::SemanticGaussiansOpenSeg => None,
@@ -127,6 +128,9 @@ pub struct MethodResult {
     pub path: PathBuf,
     /// The Gaussians, without the properties that became values.
     pub cloud: Arc<GaussianCloud>,
+    /// Text encoder whose embeddings its values are compared with, by its name in the list of models; `None` if it knows
+    /// no language.
+    pub encoder: Option<String>,
     /// Cameras of the photos, if they lie beside it.
     pub cameras: Vec<SceneCamera>,
     /// Levels, in the order of their files.
@@ -230,6 +234,15 @@ pub struct Classifier {
     pub weight: FeatureRows,
     /// Bias of each class.
     pub bias: Vec<f32>,
+    /// Names of classes that have one.
+    pub names: BTreeMap<u32, String>,
+}
+
+impl Classifier {
+    /// The class of this name; letter case and articles in front do not count.
+    pub fn named(&self, name: &str) -> Option<u32> {
+        self.names.iter().find(|(_, own)| key(own) == key(name)).map(|(class, _)| *class)
+    }
 }
 
 /// Gaussians in groups.
@@ -334,7 +347,8 @@ impl MethodResult {
             }
         }
         let beside = gs_output::beside(splat).unwrap_or_default();
-        Ok(Self { method, path: splat.into(), cloud, cameras: beside.cameras, levels })
+        let encoder = method.encoder().map(str::to_owned);
+        Ok(Self { method, path: splat.into(), cloud, encoder, cameras: beside.cameras, levels })
     }
 }
 
@@ -351,5 +365,32 @@ impl LevelValues {
     /// Returns whether there are no Gaussians.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
+    }
+
+    /// Numbers of a Gaussian's code; `None` if Gaussians have numbers of clusters instead.
+    pub fn code_dim(&self) -> Option<usize> {
+        match self {
+            Self::Embedded(level) => Some(level.codes.dim()),
+            Self::Classes { features, .. } | Self::Affinity { features, .. } => Some(features.dim()),
+            Self::Clusters(_) => None,
+        }
+    }
+
+    /// Copies the code of Gaussian `i` into `out`, as the method stores it; leaves `out` as it is without codes.
+    pub fn copy_code(&self, i: usize, out: &mut [f32]) {
+        match self {
+            Self::Embedded(level) => level.codes.copy(i, 0, out),
+            Self::Classes { features, .. } | Self::Affinity { features, .. } => features.copy(i, 0, out),
+            Self::Clusters(_) => {}
+        }
+    }
+
+    /// Numbers of a Gaussian's embedding; `None` if the method knows no language.
+    pub fn embedding_dim(&self) -> Option<usize> {
+        match self {
+            Self::Embedded(level) => Some(level.decoder.outputs()),
+            Self::Clusters(level) => Some(level.features.dim()),
+            Self::Classes { .. } | Self::Affinity { .. } => None,
+        }
     }
 }

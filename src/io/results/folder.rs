@@ -16,11 +16,13 @@ pub struct ResultOptions {
     pub decoder: Option<PathBuf>,
     /// Entries of the codebook for each Gaussian of LangSplatV2, as it was trained.
     pub top_k: usize,
+    /// Text encoder that the result was trained with, by its name in the list of models; `None` = its method's.
+    pub encoder: Option<String>,
 }
 
 impl Default for ResultOptions {
     fn default() -> Self {
-        Self { decoder: None, top_k: 4 }
+        Self { decoder: None, top_k: 4, encoder: None }
     }
 }
 

@@ -1,8 +1,9 @@
 //! Gaussian Grouping, Gaga and OmniSeg3D-GS: `point_cloud.ply` with `obj_dc_0..15`, and the first two with
-//! `classifier.pth` beside it.
+//! `classifier.pth` beside it, and perhaps names of its classes that people wrote.
 
 use std::path::{Path, PathBuf};
 
+use super::class_names;
 use super::face::{Classifier, LevelValues, Method, MethodResult};
 use super::folder::ResultOptions;
 use super::rows;
@@ -45,5 +46,6 @@ fn classifier(file: &Path, dim: usize) -> Result<Classifier, IoError> {
         let reason = format!("has the shape {shape:?}, with {} biases, for features of {dim} numbers", bias.len());
         return Err(tensors.error("weight", reason));
     }
-    Ok(Classifier { weight, bias })
+    let names = class_names::read(&file.with_file_name(class_names::FILE), bias.len())?;
+    Ok(Classifier { weight, bias, names })
 }

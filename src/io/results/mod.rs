@@ -5,6 +5,7 @@
 //! read exactly is refused with the reason.
 
 pub(in crate::io) mod autoencoder;
+mod class_names;
 mod decoder;
 mod face;
 mod faiss;
@@ -30,7 +31,7 @@ mod tensors;
 mod thgs;
 
 #[cfg(test)]
-mod neighbor_tests;
+mod broken_tests;
 #[cfg(test)]
 pub(crate) mod tests;
 

@@ -59,7 +59,7 @@ pub fn open_result(path: &Path, options: &ResultOptions) -> Result<MethodResult,
         let cause = std::io::ErrorKind::NotFound.into();
         return Err(IoError::Read { path: path.into(), cause });
     }
-    match place(path)? {
+    let result = match place(path)? {
         Some(ResultPlace::Thgs(file)) => thgs::read(&file),
         Some(ResultPlace::Saga(file)) => saga::read(&file),
         Some(ResultPlace::Laga(file)) => laga::read(&file),
@@ -81,6 +81,24 @@ pub fn open_result(path: &Path, options: &ResultOptions) -> Result<MethodResult,
                      LEGaussians, GAGS, LangSplat, LangSplatV2, Occam's LGS, Dr.Splat, THGS, ReLaGS, \
                      splat-distiller, LUDVIG and Semantic Gaussians",
         }),
+    }?;
+    with_encoder(result, options)
+}
+
+/// A result whose phrases are encoded by the encoder of the options, if they name one.
+///
+/// # Errors
+/// If it knows no language.
+fn with_encoder(result: MethodResult, options: &ResultOptions) -> Result<MethodResult, IoError> {
+    let knows_language = result.encoder.is_some() || result.method.missing_encoder().is_some();
+    match &options.encoder {
+        Some(_) if !knows_language => Err(IoError::Unsupported {
+            what: format!("a text encoder for a result of {} (it knows no language)", result.method.name()),
+            path: result.path,
+            remedy: "leave out --encoder",
+        }),
+        Some(name) => Ok(MethodResult { encoder: Some(name.clone()), ..result }),
+        None => Ok(result),
     }
 }
 

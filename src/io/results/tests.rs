@@ -4,7 +4,6 @@ use std::path::{Path, PathBuf};
 
 use super::numpy::{self, NumpyArray};
 use super::*;
-use crate::io::IoError;
 
 /// Folder of the samples.
 pub(crate) fn samples() -> PathBuf {
@@ -68,6 +67,42 @@ fn gaussian_grouping_has_its_features_and_its_classifier() {
         panic!("no classes")
     };
     assert_ne!(bits(&features.to_vec()), bits(&turned), "the control");
+}
+
+/// A copy of Gaussian Grouping's sample in `folder` whose classes have names.
+pub(crate) fn with_class_names(folder: &Path, names: &str) -> PathBuf {
+    let to = folder.join("named");
+    copied(&samples().join("gaussian_grouping"), &to);
+    std::fs::write(to.join("point_cloud/iteration_30000/class_names.txt"), names).expect("written");
+    to
+}
+
+#[test]
+fn classes_of_gaussian_grouping_have_the_names_in_a_file() {
+    let folder = tempfile::tempdir().expect("folder");
+    let opened = open_result(&with_class_names(folder.path(), "7 kettle\n3 mug\n"), &ResultOptions::default());
+    let LevelValues::Classes { classifier, .. } = &opened.expect("opens").levels[0].values else { panic!("classes") };
+    let named = ["kettle", "the Kettle", "mug", "class 7", "lid"].map(|name| classifier.named(name));
+    assert_eq!(named, [Some(7), Some(7), Some(3), None, None]);
+    let LevelValues::Classes { classifier, .. } = &sample("gaussian_grouping").levels[0].values else {
+        panic!("no classes")
+    };
+    assert_eq!(classifier.named("kettle"), None, "the control");
+    let e = refused(&with_class_names(folder.path(), "7 kettle\n999 mug\n"));
+    assert!(e.contains("class_names.txt") && e.contains("line 2"), "{e}");
+}
+
+#[test]
+fn another_text_encoder_is_taken_where_there_is_a_language() {
+    let options = ResultOptions { encoder: Some("demo".into()), ..ResultOptions::default() };
+    for path in ["langsplat/output", "opengaussian", "feature_3dgs/lseg"] {
+        let other = open_result(&samples().join(path), &options).expect(path);
+        assert_eq!(other.encoder.as_deref(), Some("demo"), "{path}");
+        let usual = sample(path);
+        assert_eq!(usual.encoder.as_deref(), usual.method.encoder(), "the control");
+    }
+    let e = open_result(&samples().join("gaussian_grouping"), &options).expect_err("no language").to_string();
+    assert!(e.contains("Gaussian Grouping") && e.contains("--encoder"), "{e}");
 }
 
 #[test]
@@ -134,6 +169,14 @@ fn gags_has_its_codes_and_a_decoder_with_skips() {
         assert_eq!((level.decoder.inputs(), level.decoder.outputs()), (16, 512));
         let count = |wanted| level.decoder.split().0.iter().filter(|step| **step == wanted).count();
         assert_eq!([DecoderStep::Relu, DecoderStep::Keep, DecoderStep::AddKept].map(count), [8, 2, 2]);
+        let wanted = expected("gags/expected/decoded_first_rows.npy");
+        let apart = |i: usize, row: usize| {
+            let (mut code, wanted) = (vec![0.0; 16], &wanted[512 * row..]);
+            level.codes.copy(i, 0, &mut code);
+            let found = level.decoder.embedding(&code);
+            found.iter().zip(wanted).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max)
+        };
+        assert!((0..4).all(|i| apart(i, i) < 1e-4) && apart(0, 1) > 1e-3, "the control: another row");
     }
 }
 
@@ -317,52 +360,4 @@ pub(crate) fn copied(from: &Path, to: &Path) {
             false => drop(std::fs::copy(entry.path(), to.join(entry.file_name())).expect("copied")),
         }
     }
-}
-
-#[test]
-fn cut_files_are_errors_wherever_they_end() {
-    let folder = tempfile::tempdir().expect("folder");
-    for (sample, file) in [
-        ("dr_splat", "pq_index.faiss"),
-        ("opengaussian", "cluster_lang.npz"),
-        ("thgs", "sai_nag.pt"),
-        ("langsplat_v2", "output/made_up_0_2/chkpnt10000.pth"),
-        ("saga", "point_cloud/iteration_10000/contrastive_feature_point_cloud.ply"),
-        ("ludvig", "features.npy"),
-        ("splat_distiller", "ckpts/ckpt_29999_rank0_features.pt"),
-        ("gags", "decoder_chkpnt30000.pth"),
-        ("laga", "point_cloud/iteration_30000/multi_lvl_seg_scores.pth"),
-        ("semantic_gaussians", "fusion/0.pt"),
-    ] {
-        let to = folder.path().join(sample);
-        copied(&samples().join(sample), &to);
-        let whole = std::fs::read(to.join(file)).expect("read");
-        let at = if sample == "langsplat_v2" { to.join("output") } else { to.clone() };
-        assert!(open_result(&at, &ResultOptions::default()).is_ok(), "{sample}");
-        // The end of the index, lists of vectors, is not needed.
-        let needed = if sample == "dr_splat" { whole.len() - 32 } else { whole.len() };
-        for k in 0..24 {
-            std::fs::write(to.join(file), &whole[..(needed - 1) * k / 23]).expect("written");
-            let result = open_result(&at, &ResultOptions::default());
-            assert!(result.is_err(), "{sample} cut at {k} of 23");
-        }
-    }
-}
-
-#[test]
-fn changed_bytes_of_an_index_are_errors_or_other_numbers() {
-    let folder = tempfile::tempdir().expect("folder");
-    copied(&samples().join("dr_splat"), folder.path());
-    let file = folder.path().join("pq_index.faiss");
-    let whole = std::fs::read(&file).expect("read");
-    let mut refused = 0;
-    for at in 0..200 {
-        let mut bytes = whole.clone();
-        bytes[at] ^= 0x80;
-        std::fs::write(&file, bytes).expect("written");
-        refused += usize::from(open_result(folder.path(), &ResultOptions::default()).is_err());
-    }
-    assert!(refused > 30, "{refused}");
-    let missing = IoError::syntax(&file, "index", "x").to_string();
-    assert!(missing.contains("pq_index.faiss"));
 }

@@ -1,11 +1,14 @@
 //! Comparison of scenes of any method: the same phrases and views, relevancy, masks by each method's own rule and by a
 //! common one, scores and times, as a table, pictures and a page.
 //!
-//! [`subject`] opens what is compared and answers behind one trait, [`views`] chooses cameras and labels, [`vectors`]
-//! encodes phrases, [`cell`] is the result. [`protocol`] scores one scene by the protocols of the literature.
+//! [`subject`] opens what is compared and answers behind one trait, [`answer`] asks it, [`views`] chooses cameras and
+//! labels, [`vectors`] encodes phrases, [`cell`] is the result. [`protocol`] scores one scene by the protocols of the literature.
 
+pub(crate) mod answer;
 pub(crate) mod cell;
+mod classes;
 mod letters;
+mod phrase_answers;
 pub(crate) mod protocol;
 mod sheet;
 pub(crate) mod subject;
@@ -16,27 +19,27 @@ pub(crate) mod vectors;
 pub(crate) mod views;
 pub(crate) mod write;
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::time::Instant;
 
+use self::answer::PhraseAnswer;
 use self::cell::{AnswerMs, ComparedCell, ComparedMethod, Comparison, RuledCell, ShownRelevancy};
 use self::sheet::SheetRow;
 use self::subject::CompareSubject;
 use self::tile::{CellTile, TilePicture};
 use self::vectors::{KnownVectors, TextFunction};
-use self::views::{ComparedView, ViewChoice};
-use super::{JobError, export};
+use self::views::{ComparedView, ViewChoice, WantedViews};
+use super::JobError;
 use crate::io::results::ResultOptions;
 use crate::math::format::things;
 use crate::math::stats::median;
 use crate::pipeline::observer::{Observer, Ticker};
-use crate::pipeline::semantics::evaluation::by_rule::{CutRule, PhraseInView};
-use crate::pipeline::semantics::query::foreign::ForeignError;
-use crate::pipeline::semantics::query::foreign::own_rules::ForeignMask;
 use crate::pipeline::semantics::query::timing::ms_since;
-use crate::pipeline::semantics::relevancy::on_lerfs_scale;
 use crate::pipeline::semantics::smoothing::largest;
 use crate::render::{Features, Renderer};
+
+/// Longer side of the views of a sheet, px.
+const MAX_SIDE_PX: u32 = 1_008;
 
 /// Scenes that are compared at most.
 pub(crate) const MOST_SCENES: usize = 4;
@@ -54,6 +57,27 @@ pub(crate) struct CompareRequest {
     pub(crate) out: Option<PathBuf>,
     /// Write the relevancy of every cell as arrays.
     pub(crate) arrays: bool,
+}
+
+impl CompareRequest {
+    /// Comparison of one phrase in the view of a photo, for a folder of results.
+    pub(crate) fn of_view(
+        scenes: Vec<PathBuf>,
+        phrase: String,
+        view: String,
+        photos: Option<PathBuf>,
+        folder: PathBuf,
+    ) -> Self {
+        Self {
+            scenes: scenes.into_iter().map(|path| (path, ResultOptions::default())).collect(),
+            phrases: vec![phrase],
+            views: ViewChoice { wanted: WantedViews::Named(vec![view]), photos, truth: None, max_side_px: MAX_SIDE_PX },
+            repeats: 1,
+            shown: ShownRelevancy::default(),
+            out: Some(folder),
+            arrays: false,
+        }
+    }
 }
 
 /// Compares scenes; `encode` gives the vectors of phrases.
@@ -105,14 +129,15 @@ fn of_scenes(
             }
             for (p, phrase) in phrases.iter().enumerate() {
                 let asked = Asked { view, phrase, camera: k, blend: median(&blend), repeats };
-                let (cell, maps) = asked.of(scene, &mut vectors)?;
-                if let (Some(maps), Some(folder), true) = (&maps, &request.out, request.arrays) {
-                    maps.write(&folder.join(write::ARRAYS), &format!("{p:03}_{v:03}_{}", k + 1))?;
+                let (cell, answer) = asked.of(scene, &mut vectors)?;
+                if let (Some(answer), Some(folder), true) = (&answer, &request.out, request.arrays) {
+                    answer.write(&folder.join(write::ARRAYS), &format!("{p:03}_{v:03}_{}", k + 1))?;
                 }
                 let at = place(p, v);
                 if at < sheet::MOST_ROWS {
                     let row = rows[at].get_or_insert_with(|| row_of(&colors, view, phrase));
-                    row.cells.push(maps.map(|maps| maps.tile(request.shown)));
+                    row.cells
+                        .push(answer.map(|answer| CellTile::new(&answer.values(request.shown), &answer.mask().mask)));
                 }
                 cells[at].push(cell);
             }
@@ -198,7 +223,7 @@ impl Asked<'_> {
         &self,
         scene: &mut CompareSubject,
         vectors: &mut KnownVectors<'_>,
-    ) -> Result<(ComparedCell, Option<CellMaps>), JobError> {
+    ) -> Result<(ComparedCell, Option<PhraseAnswer>), JobError> {
         let Self { view, phrase, camera, blend, repeats } = *self;
         let mut cell = ComparedCell {
             view: view.name.clone(),
@@ -212,93 +237,17 @@ impl Asked<'_> {
         };
         let camera = &view.cameras[camera];
         let size = (camera.width_px as usize, camera.height_px as usize);
-        let (answer, encode, decode) = match answered(scene, phrase, vectors, repeats) {
-            Ok((levels, own, encode, decode)) => (PhraseInView { levels, own, size }, encode, decode),
-            Err(e) => {
-                cell.problem = Some(problem(e)?);
+        let answer = match PhraseAnswer::of(scene, phrase, size, vectors, repeats)? {
+            Ok(answer) => answer,
+            Err(why) => {
+                cell.problem = Some(why);
                 return Ok((cell, None));
             }
         };
-        let Some(common) = answer.mask(CutRule::Common) else {
-            cell.problem = Some("the phrase has no word to look for".into());
-            return Ok((cell, None));
-        };
-        cell.ms = AnswerMs { encode, blend, decode };
+        cell.ms = AnswerMs { blend, ..answer.ms };
         cell.own = answer.own.as_ref().map(|found| RuledCell::new(found, view, phrase));
-        cell.common = Some(RuledCell::new(&common, view, phrase));
-        // The level that the method chose, if it chose one.
-        let level = answer.own.as_ref().map_or(common.level, |own| own.level).min(answer.levels.len() - 1);
-        let raw = answer.levels.get(level).cloned().unwrap_or_default();
-        cell.most = Some(largest(&raw));
-        Ok((cell, Some(CellMaps { raw, own: answer.own, common })))
-    }
-}
-
-type TimedAnswer = (Vec<Vec<f32>>, Option<ForeignMask>, f64, f64);
-
-/// Relevancy of all levels and the mask by the own rule, with the milliseconds of encoding and decoding.
-fn answered(
-    scene: &mut CompareSubject,
-    phrase: &str,
-    vectors: &mut KnownVectors<'_>,
-    repeats: usize,
-) -> Result<TimedAnswer, JobError> {
-    let answers = &mut scene.answers;
-    let encode = answers.encode(phrase, vectors)?;
-    let (mut levels, mut decode) = (Vec::new(), Vec::with_capacity(repeats));
-    for _ in 0..repeats {
-        let start = Instant::now();
-        levels = answers.levels(phrase, vectors)?;
-        decode.push(ms_since(start));
-    }
-    Ok((levels, answers.own_mask(phrase, vectors)?, encode, median(&decode)))
-}
-
-/// Returns why a scene has no answer; other errors stay errors.
-fn problem(e: JobError) -> Result<String, JobError> {
-    match e {
-        JobError::Foreign(
-            e @ (ForeignError::NoLanguage(_)
-            | ForeignError::NoIdentities(_)
-            | ForeignError::NoRule(_)
-            | ForeignError::Dimension { .. }),
-        ) => Ok(e.to_string()),
-        e => Err(e),
-    }
-}
-
-/// Relevancy and masks of a cell.
-struct CellMaps {
-    raw: Vec<f32>,
-    own: Option<ForeignMask>,
-    common: ForeignMask,
-}
-
-impl CellMaps {
-    fn on_lerfs_scale(&self) -> Vec<f32> {
-        let most = largest(&self.raw);
-        self.raw.iter().map(|r| on_lerfs_scale(*r, most).clamp(0.0, 1.0)).collect()
-    }
-
-    fn tile(&self, shown: ShownRelevancy) -> CellTile {
-        let mask = &self.own.as_ref().unwrap_or(&self.common).mask;
-        match (shown, &self.own) {
-            (ShownRelevancy::Raw, _) => CellTile::new(&self.raw, mask),
-            (ShownRelevancy::Own, Some(own)) => CellTile::new(&own.values, mask),
-            (ShownRelevancy::Lerf | ShownRelevancy::Own, _) => CellTile::new(&self.on_lerfs_scale(), mask),
-        }
-    }
-
-    /// Writes the arrays of all three kinds.
-    fn write(&self, folder: &Path, name: &str) -> Result<(), JobError> {
-        export::make_folder(folder)?;
-        let size = [self.common.mask.width_px() as u32, self.common.mask.height_px() as u32];
-        let write = |what: &str, values: &[f32]| export::npy(&folder.join(format!("{name}_{what}.npy")), values, size);
-        write("raw", &self.raw)?;
-        write("lerf", &self.on_lerfs_scale())?;
-        if let Some(own) = &self.own {
-            write("own", &own.values)?;
-        }
-        Ok(())
+        cell.common = Some(RuledCell::new(&answer.common, view, phrase));
+        cell.most = Some(largest(&answer.raw));
+        Ok((cell, Some(answer)))
     }
 }

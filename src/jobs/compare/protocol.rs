@@ -94,7 +94,10 @@ pub(crate) fn evaluate(
             }
             let phrase = views::as_phrase(class);
             let levels = scene.answers.levels(&phrase, &mut vectors)?;
-            let own = if category.is_some() { scene.answers.own_mask(&phrase, &mut vectors)? } else { None };
+            let own = match category {
+                Some(_) => scene.answers.own_mask(&phrase, &levels, &mut vectors)?,
+                None => None,
+            };
             let answer = PhraseInView { levels, own, size };
             winning.add(k, &answer);
             if let Some(category) = category {

@@ -3,37 +3,58 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+use super::classes::ClassAnswers;
+use super::phrase_answers::PhraseAnswers;
 use super::vectors::KnownVectors;
 use crate::io::IoError;
-use crate::io::results::{Method, MethodResult, ResultOptions, open_result};
+use crate::io::results::{Method, MethodKind, MethodResult, ResultOptions, open_result};
 use crate::io::trained::{self, SceneCamera};
-use crate::jobs::query::{QueryEngine, ViewMaps, seen_from};
+use crate::jobs::query::{BY_IDENTITY, QueryEngine, ViewMaps, seen_from};
 use crate::jobs::{JobError, Scene, open};
 use crate::pipeline::semantics::evaluation::langsplat;
 use crate::pipeline::semantics::query::foreign::asked::{ForeignScene, ForeignView};
 use crate::pipeline::semantics::query::foreign::own_rules::ForeignMask;
+use crate::pipeline::semantics::query::foreign::pointed::PointedPixel;
 use crate::pipeline::semantics::query::foreign::{ForeignError, ForeignPhrase};
 use crate::pipeline::semantics::query::recipe::{QueryConfig, TEMPERATURE};
 use crate::pipeline::semantics::smoothing::{largest_level, peak};
+use crate::pipeline::semantics::view_map::ViewMap;
 use crate::render::{RenderSettings, Renderer};
-use crate::scene::{Camera, GaussianCloud, LevelFilter, SemanticMap};
+use crate::scene::{Camera, GaussianCloud, LevelFilter, Mask, NO_IDENTITY, SemanticMap};
 
-/// Own rule of this program in words.
-const BY_IDENTITY: &str = "pixels of the object or part that is the answer";
+/// Options in the remedies of errors that are about an option, not about the files.
+const OF_OPTIONS: [&str; 2] = ["--decoder", "--encoder"];
 
-/// Answers of a scene to phrases.
-pub(crate) trait PhraseAnswers {
-    /// Renders what phrases need of a view.
-    fn look(&mut self, camera: &Camera) -> Result<(), JobError>;
+/// A scene that is opened for questions once it is asked.
+#[derive(Clone, Debug)]
+pub(crate) enum AskedScene {
+    /// A scene with objects.
+    Own(Scene, Arc<SemanticMap>),
+    /// A result with embeddings.
+    Result(PathBuf),
+}
 
-    /// Encodes a phrase; returns the milliseconds that it takes.
-    fn encode(&mut self, phrase: &str, vectors: &mut KnownVectors<'_>) -> Result<f64, JobError>;
+impl AskedScene {
+    /// What can be asked of a scene with these objects; `None` if nothing can.
+    pub(crate) fn of(scene: &Scene, map: Option<&Arc<SemanticMap>>) -> Option<Self> {
+        let by_objects = || map.map(|map| Self::Own(scene.clone(), Arc::clone(map)));
+        match scene.method.map(Method::kind) {
+            Some(MethodKind::Embeddings | MethodKind::Clusters) => Some(Self::Result(scene.path.clone())),
+            Some(MethodKind::Affinities) => by_objects().or_else(|| Some(Self::Result(scene.path.clone()))),
+            Some(MethodKind::Classes) | None => by_objects(),
+        }
+    }
 
-    /// Relevancy of each level at each pixel of the view, row-major, 0 to 1.
-    fn levels(&mut self, phrase: &str, vectors: &mut KnownVectors<'_>) -> Result<Vec<Vec<f32>>, JobError>;
-
-    /// The mask by the scene's own rule, if it has one.
-    fn own_mask(&mut self, phrase: &str, vectors: &mut KnownVectors<'_>) -> Result<Option<ForeignMask>, JobError>;
+    /// Opens it.
+    ///
+    /// # Errors
+    /// If it cannot be read, or the encoder of its objects is not here.
+    pub(crate) fn open(&self) -> Result<CompareSubject, JobError> {
+        match self {
+            Self::Own(scene, map) => CompareSubject::own(scene.clone(), (**map).clone()),
+            Self::Result(path) => CompareSubject::open(path, &ResultOptions::default()),
+        }
+    }
 }
 
 /// A scene that is compared.
@@ -59,6 +80,10 @@ impl CompareSubject {
     /// If it is neither, cannot be read, or is a scene without objects.
     pub(crate) fn open(path: &Path, options: &ResultOptions) -> Result<Self, JobError> {
         if is_own(path) {
+            if *options != ResultOptions::default() {
+                let text = "--decoder and --encoder are for results of other methods; this is a scene of this program";
+                return Err(JobError::Output(format!("{}: {text}", path.display())));
+            }
             let scene = open::scene(path)?;
             let map = scene.semantics()?;
             return Self::own(scene, map);
@@ -69,32 +94,38 @@ impl CompareSubject {
     /// Opens the result of another method; `None` if the path is none.
     ///
     /// # Errors
-    /// If only a file that can be named is missing.
+    /// If only a file that can be named is missing, or an encoder is named for a result without language.
     pub(crate) fn of_another_method(path: &Path, options: &ResultOptions) -> Result<Option<Self>, JobError> {
         if is_own(path) || !path.exists() {
             return Ok(None);
         }
         match open_result(path, options) {
             Ok(result) => Ok(Some(Self::of_result(result, path))),
-            Err(e @ IoError::Unsupported { remedy, .. }) if remedy.contains("--decoder") => Err(e.into()),
+            Err(e @ IoError::Unsupported { remedy, .. }) if OF_OPTIONS.iter().any(|o| remedy.contains(o)) => {
+                Err(e.into())
+            }
             Err(_) => Ok(None),
         }
     }
 
     /// The result of another method.
     pub(crate) fn of_result(result: MethodResult, path: &Path) -> Self {
-        let (method, cloud) = (result.method, result.cloud.clone());
-        let cameras = result.cameras.clone();
+        let (name, encoder) = (result.method.name().to_owned(), result.encoder.clone());
+        let (cameras, cloud) = (result.cameras.clone(), result.cloud.clone());
         let scene = ForeignScene::new(Arc::new(result));
+        let answers: Box<dyn PhraseAnswers> = match scene.has_named_classes() {
+            true => Box::new(ClassAnswers::new(scene)),
+            false => Box::new(ForeignAnswers { scene, renderer: Renderer::new(), view: None }),
+        };
         Self {
-            name: method.name().into(),
+            name,
             path: path.into(),
-            encoder: method.encoder().map(str::to_owned),
+            encoder,
             cameras,
             photos: None,
             settings: RenderSettings::of_mode(cloud.render_mode),
             cloud,
-            answers: Box::new(ForeignAnswers { method, scene, renderer: Renderer::new(), view: None }),
+            answers,
         }
     }
 
@@ -140,7 +171,6 @@ pub(crate) fn name_apart(scenes: &mut [CompareSubject]) {
 
 /// A result of another method with its view.
 struct ForeignAnswers {
-    method: Method,
     scene: ForeignScene,
     renderer: Renderer,
     view: Option<ForeignView>,
@@ -153,14 +183,18 @@ struct EncodedPhrase {
 }
 
 impl EncodedPhrase {
-    fn new(method: Method, phrase: &str, vectors: &mut KnownVectors<'_>) -> Result<Self, JobError> {
-        let encoder = method.encoder().ok_or_else(|| ForeignError::of_silent(method))?;
+    fn new(result: &MethodResult, phrase: &str, vectors: &mut KnownVectors<'_>) -> Result<Self, JobError> {
+        let encoder = encoder_of(result)?;
         Ok(Self { query: vectors.get(encoder, phrase)?.0, canonical: vectors.canonical(encoder)? })
     }
 
     fn as_foreign(&self) -> ForeignPhrase<'_> {
         ForeignPhrase { query: &self.query, canonical: &self.canonical, temperature: TEMPERATURE }
     }
+}
+
+fn encoder_of(result: &MethodResult) -> Result<&str, ForeignError> {
+    result.encoder.as_deref().ok_or_else(|| ForeignError::of_silent(result.method))
 }
 
 impl PhraseAnswers for ForeignAnswers {
@@ -170,28 +204,34 @@ impl PhraseAnswers for ForeignAnswers {
     }
 
     fn encode(&mut self, phrase: &str, vectors: &mut KnownVectors<'_>) -> Result<f64, JobError> {
-        let encoder = self.method.encoder().ok_or_else(|| ForeignError::of_silent(self.method))?;
+        let encoder = encoder_of(&self.scene.result)?;
         vectors.canonical(encoder)?;
         Ok(vectors.get(encoder, phrase)?.1)
     }
 
     fn levels(&mut self, phrase: &str, vectors: &mut KnownVectors<'_>) -> Result<Vec<Vec<f32>>, JobError> {
-        let encoded = EncodedPhrase::new(self.method, phrase, vectors)?;
+        let encoded = EncodedPhrase::new(&self.scene.result, phrase, vectors)?;
         let Some(view) = &self.view else { return Ok(Vec::new()) };
-        let one = |level| {
-            let found = self.scene.pixel_relevancy(&mut self.renderer, view, level, encoded.as_foreign());
-            found.map_err(JobError::from)
-        };
-        (0..self.scene.result.levels.len()).map(one).collect()
+        Ok(self.scene.relevancy(&mut self.renderer, view, encoded.as_foreign())?)
     }
 
-    fn own_mask(&mut self, phrase: &str, vectors: &mut KnownVectors<'_>) -> Result<Option<ForeignMask>, JobError> {
-        let encoded = EncodedPhrase::new(self.method, phrase, vectors)?;
+    fn own_mask(
+        &mut self,
+        phrase: &str,
+        levels: &[Vec<f32>],
+        vectors: &mut KnownVectors<'_>,
+    ) -> Result<Option<ForeignMask>, JobError> {
+        let encoded = EncodedPhrase::new(&self.scene.result, phrase, vectors)?;
         let Some(view) = &self.view else { return Ok(None) };
-        match self.scene.own_mask(&mut self.renderer, view, encoded.as_foreign()) {
+        match self.scene.own_mask(&mut self.renderer, view, encoded.as_foreign(), levels) {
             Err(ForeignError::NoRule(_)) => Ok(None),
             found => Ok(Some(found?)),
         }
+    }
+
+    fn pointed(&mut self, pixel: PointedPixel) -> Result<Option<ForeignMask>, JobError> {
+        let Some(view) = &self.view else { return Ok(None) };
+        Ok(self.scene.pointed(view, pixel)?)
     }
 }
 
@@ -223,13 +263,38 @@ impl PhraseAnswers for OwnAnswers {
         Ok(langsplat::levels(&answered, &maps.identities, &self.map.identities).into())
     }
 
-    fn own_mask(&mut self, phrase: &str, _: &mut KnownVectors<'_>) -> Result<Option<ForeignMask>, JobError> {
+    fn own_mask(
+        &mut self,
+        phrase: &str,
+        levels: &[Vec<f32>],
+        _: &mut KnownVectors<'_>,
+    ) -> Result<Option<ForeignMask>, JobError> {
         let answered = self.engine.ask(&self.map, phrase, LevelFilter::Auto)?;
         let (Some(maps), Some(answered)) = (&self.maps, answered) else { return Ok(None) };
         let (mask, values) = (maps.of_answer(&self.map, &answered, 1), answered.heat(&maps.identities));
-        let levels = langsplat::levels(&answered, &maps.identities, &self.map.identities);
-        let level = largest_level(&levels).unwrap_or(0);
+        let level = largest_level(levels).unwrap_or(0);
         let peak = peak(&values).filter(|at| values[*at] > 0.0);
         Ok(Some(ForeignMask { mask, level, values, peak, rule: BY_IDENTITY }))
+    }
+
+    fn pointed(
+        &mut self,
+        PointedPixel { at: [x, y], scale, .. }: PointedPixel,
+    ) -> Result<Option<ForeignMask>, JobError> {
+        let Some(maps) = &self.maps else { return Ok(None) };
+        let ViewMap { width_px, height_px, identity, .. } = &maps.identities;
+        let i = (x < *width_px && y < *height_px).then(|| y * width_px + x);
+        let Some((i, id)) = i.and_then(|i| Some((i, *identity.get(i)?))) else { return Ok(None) };
+        let all = &self.map.identities;
+        if all.get(id).is_none() {
+            return Ok(None);
+        }
+        // Details are the part, anything larger is the whole.
+        let whole = all.get(id).map(|of| of.parent).filter(|parent| *parent != NO_IDENTITY && scale >= 0.5);
+        let inside = all.descendants(whole.unwrap_or(id));
+        let is_in = |i: usize| inside.get(identity[i] as usize) == Some(&true);
+        let mask = Mask::from_fn(*width_px, *height_px, is_in);
+        let values = (0..identity.len()).map(|i| f32::from(u8::from(is_in(i)))).collect();
+        Ok(Some(ForeignMask { mask, level: usize::from(whole.is_some()), values, peak: Some(i), rule: BY_IDENTITY }))
     }
 }

@@ -1,5 +1,6 @@
 //! Samples of other methods and a scene of this program side by side; vectors of phrases come with the samples.
 
+use std::path::Path;
 use std::sync::Arc;
 
 use glam::DVec3;
@@ -8,11 +9,13 @@ use image::ColorType;
 use super::protocol::{ResultEvaluation, evaluate};
 use super::views::WantedViews;
 use super::*;
-use crate::io::results::tests::{expected, sample, samples};
+use crate::io::results::tests::{expected, sample, samples, with_class_names};
 use crate::io::trained::SceneCamera;
-use crate::jobs::Scene;
 use crate::jobs::evaluate_masks::Protocol;
+use crate::jobs::{Scene, export};
 use crate::pipeline::observer::Silent;
+use crate::pipeline::semantics::evaluation::by_rule::{CutRule, PhraseInView};
+use crate::pipeline::semantics::query::foreign::own_rules::ForeignMask;
 use crate::scene::{Camera, GaussianCloud, Identities, Level, Mask, NO_IDENTITY, SemanticMap};
 
 /// Vectors of the samples: the phrase's, and those of the canonical ones.
@@ -82,6 +85,65 @@ fn methods_stand_side_by_side_and_those_without_language_say_so() {
     assert!(found.range[0] < found.range[1] && found.range[1] <= 1.0, "{:?}", found.range);
     let e = refused(&request(&["langsplat_v2/output", "opengaussian"], "7"));
     assert!(e.contains("'7'") && e.contains("'view_0' to 'view_1'"), "{e}");
+}
+
+#[test]
+fn classes_with_names_answer_them_and_nothing_else() {
+    let folder = tempfile::tempdir().expect("folder");
+    let named = with_class_names(folder.path(), "7 kettle\n3 mug\n");
+    let mut asked = request(&["langsplat_v2/output", "gaussian_grouping"], "0");
+    asked.scenes[0].0 = named;
+    asked.phrases = ["the kettle", "mug", "lid"].map(str::to_owned).to_vec();
+    let found = compared(&asked);
+    let own = |k: usize| found.cells[k].own.as_ref().map(|own| own.area_px);
+    assert!(own(0).is_some_and(|area| area > 0) && own(0) != own(2), "{:?}", &found.cells[..3]);
+    let problem = |k: usize| found.cells[k].problem.as_deref().unwrap_or_default();
+    assert!(problem(4).contains("'lid'") && problem(4).contains("class_names.txt"), "{}", problem(4));
+    assert!(problem(1).contains("knows no language"), "the control: no names");
+    assert_eq!(found.methods.iter().map(|m| m.encoder.as_deref()).collect::<Vec<_>>(), [None, None]);
+}
+
+#[test]
+fn a_result_is_asked_by_the_encoder_that_it_was_trained_with() {
+    let mut asked = request(&["langsplat_v2/output", "langsplat/output"], "0");
+    asked.scenes[1].1.encoder = Some("demo".into());
+    let mut encoders = Vec::new();
+    let mut encode = |name: &str, phrases: &[&str]| {
+        encoders.push(name.to_owned());
+        match name {
+            "demo" => Ok(vec![vec![1.0; 128]; phrases.len()]),
+            name => given(name, phrases),
+        }
+    };
+    let found = run(&asked, &mut encode, &mut Silent).expect("compared");
+    encoders.sort();
+    encoders.dedup();
+    assert_eq!(encoders, ["clip-vit-b16", "demo"]);
+    assert_eq!(found.methods[1].encoder.as_deref(), Some("demo"));
+    let problem = found.cells[1].problem.as_deref().expect("another width");
+    assert!(["demo", "128", "512", "--encoder"].iter().all(|word| problem.contains(word)), "{problem}");
+    assert!(found.cells[0].problem.is_none(), "the control");
+    // A phrase without a known word is a reason, not the end.
+    let mut unknown =
+        |_: &str, _: &[&str]| Err(JobError::Model(ModelError::NoKnownWord { unknown: vec!["giraffe".into()] }));
+    let found = run(&asked, &mut unknown, &mut Silent).expect("compared");
+    assert!(
+        found.cells.iter().all(|c| c.problem.as_deref().is_some_and(|p| p.contains("giraffe"))),
+        "{:?}",
+        found.cells
+    );
+}
+
+#[test]
+fn options_of_results_are_refused_for_scenes_of_this_program() {
+    let folder = tempfile::tempdir().expect("folder");
+    std::fs::write(folder.path().join("scene.json"), "{}").expect("written");
+    let with = |encoder: Option<&str>| {
+        let options = ResultOptions { encoder: encoder.map(str::to_owned), ..ResultOptions::default() };
+        CompareSubject::open(folder.path(), &options).err().expect("refused").to_string()
+    };
+    assert!(with(Some("demo")).contains("--encoder"));
+    assert!(!with(None).contains("--encoder"), "the control");
 }
 
 #[test]

@@ -2,11 +2,13 @@
 //! times in one process; compare only numbers of one run.
 
 pub mod draw;
+pub(crate) mod made_up_results;
 pub(crate) mod masks;
 pub(crate) mod moving;
 pub(crate) mod one_core;
 pub(crate) mod query;
 pub(crate) mod questions;
+pub(crate) mod results;
 pub mod train;
 
 use std::path::Path;

@@ -5,6 +5,7 @@
 //! `d = q - max_i c_i` and temperature `tau = 1`; `q`, `c` are cosines. Order and the crossing at
 //! one half do not depend on the temperature; the spread does.
 
+use crate::math::Real;
 use crate::math::vector::{dot, unit};
 
 /// Advantage of a feature's similarity to the query over that to the nearest `canonical` phrase. Positive for an
@@ -30,6 +31,15 @@ pub(crate) fn on_lerfs_scale(relevancy: f32, most: f32) -> f32 {
 /// The score of an advantage, 0 to 1.
 pub fn score(advantage: f32, temperature: f32) -> f32 {
     1.0 / (1.0 + (-temperature * advantage).exp())
+}
+
+/// As [`score`], within a millionth, and free of branches so that loops over it vectorize.
+#[inline(always)]
+pub(crate) fn quick_score(advantage: f32, temperature: f32) -> f32 {
+    let x = temperature * advantage;
+    let e = Real::exp_neg(-x.abs());
+    let upper = 1.0 / (1.0 + e);
+    if x < 0.0 { e * upper } else { upper }
 }
 
 /// Moves a part's feature toward its whole's (the paper's semantic deviation) and normalizes it: the sum of two unit
@@ -82,11 +92,22 @@ mod tests {
     fn extremes_stay_in_range() {
         for d in [-2.0, 0.0, 2.0, f32::MIN, f32::MAX] {
             for tau in [0.0, 1.0, 1e6] {
-                let s = score(d, tau);
-                assert!((0.0..=1.0).contains(&s), "{d} {tau}: {s}");
+                let s = [score(d, tau), quick_score(d, tau)];
+                assert!(s.iter().all(|s| (0.0..=1.0).contains(s)), "{d} {tau}: {s:?}");
             }
         }
         assert_eq!(advantage(&[1.0, 0.0], &[1.0, 0.0], &[]), 1.0);
+    }
+
+    #[test]
+    fn the_quick_score_is_the_score() {
+        let most = |quick: fn(f32, f32) -> f32| {
+            let apart = |i: i32| (quick(i as f32 * 1e-3, 10.0) - score(i as f32 * 1e-3, 10.0)).abs();
+            (-2_000..=2_000).map(apart).fold(0.0, f32::max)
+        };
+        assert!(most(quick_score) < 1e-6, "{}", most(quick_score));
+        assert!(most(|d, tau| quick_score(d, tau * 1.001)) > 1e-4, "the control: another temperature");
+        assert_eq!(quick_score(0.0, 10.0), 0.5);
     }
 
     #[test]

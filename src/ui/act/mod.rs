@@ -3,11 +3,13 @@
 //! An action changes the window at once, or starts a job and says what is done with its result ([`App::start`]).
 
 pub(super) mod camera_path;
+pub(super) mod comparing;
 pub(super) mod edit;
 pub(super) mod edits;
 pub(super) mod elsewhere;
 pub(super) mod export;
 pub(super) mod gaussians;
+pub(super) mod import;
 pub(super) mod measure;
 pub(super) mod objects;
 pub(super) mod open;

@@ -13,7 +13,6 @@ use crate::ui::act::remote;
 use crate::ui::actions::{Action, Pane};
 use crate::ui::app::App;
 use crate::ui::camera;
-use crate::ui::comparison::ComparedScene;
 use crate::ui::dialogs::{DialogAnswer, Question};
 use crate::ui::file_dialogs::{FileFormat, FileRequest};
 use crate::ui::file_kind::FileKind;
@@ -45,7 +44,7 @@ pub(in crate::ui) fn open(app: &mut App, path: PathBuf) {
         return preset(app, &path);
     }
     // A scene beside this one, or made from it, is of the same place.
-    let is_beside = app.state.comparison.as_ref().is_some_and(|other| other.path == path);
+    let is_beside = app.state.beside.iter().any(|other| other.path == path);
     let is_made_of_it = app.state.removed.as_ref().is_some_and(|removed| removed.folder == path);
     let is_kin = is_beside || is_made_of_it;
     replace_scene(app, move |app| {
@@ -144,28 +143,6 @@ fn replace_scene(app: &mut App, open: impl FnOnce(&mut App) + 'static) {
             remote::cancel_job(app);
             remote::disconnect(app);
             open(app);
-        }
-    });
-}
-
-pub(in crate::ui) fn choose_comparison(app: &mut App) {
-    let request = FileRequest::folder(FileKind::Scenes, "Compare with another scene");
-    app.choose(request, |app, path| compare_scene(app, Some(path)));
-}
-
-/// Shows another scene in the second view, or none.
-pub(in crate::ui) fn compare_scene(app: &mut App, path: Option<PathBuf>) {
-    let Some(path) = path else {
-        app.state.comparison = None;
-        return;
-    };
-    app.layout.split_view = true;
-    let (workspace, title) = (Arc::clone(&app.workspace), format!("Opening {} beside", file_name(&path)));
-    let open = move |observer: &mut dyn Observer| workspace.open_comparison(&path, observer);
-    app.start(JobInfo::short(title), open, |app, scene| {
-        app.state.comparison = ComparedScene::of(scene);
-        if app.state.comparison.is_none() {
-            app.state.toast(Tone::Warning, "There is nothing to compare with: it has no Gaussians.");
         }
     });
 }

@@ -30,13 +30,16 @@ const SIDE_PX: u32 = 1008;
 
 /// Focuses the query field. If queries are impossible, the field reports why and discards the text.
 pub(in crate::ui) fn type_query(app: &mut App, ctx: &egui::Context) {
+    if app.viewport.compared.is_on() {
+        return app.viewport.compared.start_typing();
+    }
     app.asks_in_vain = app.state.why_no_query().is_some();
     keys::type_in_vain(ctx, app.asks_in_vain);
     if app.asks_in_vain {
         return;
     }
     // Queries do not go to another scene in the second view.
-    if app.state.comparison.is_some() {
+    if !app.state.beside.is_empty() {
         app.viewport.queries.work_in(false);
     }
     app.viewport.queries.start_typing();
@@ -59,8 +62,11 @@ pub(in crate::ui) fn follow_vain_query(app: &mut App, ctx: &egui::Context) {
     keys::type_in_vain(ctx, app.asks_in_vain);
 }
 
-/// Answers a query.
+/// Answers a query; of all scenes on screen, if they are compared.
 pub(in crate::ui) fn ask(app: &mut App, text: &str) {
+    if app.viewport.compared.is_on() {
+        return app.viewport.compared.ask(text);
+    }
     if let Some(semantics) = app.state.semantics.clone() {
         app.viewport.queries.ask(text, &semantics);
     }

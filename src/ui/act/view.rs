@@ -12,7 +12,7 @@ use crate::jobs::go_to::{self, ApproachRequest, Approached};
 use crate::navigate::FRAMES;
 use crate::navigate::target::{Side, ViewPreference};
 use crate::pipeline::observer::Observer;
-use crate::scene::{CameraPath, CropBox, Identities, IdentityId, NO_IDENTITY, SemanticMap};
+use crate::scene::{Camera, CameraPath, CropBox, Identities, IdentityId, NO_IDENTITY, SemanticMap};
 use crate::ui::actions::{Face, Pane};
 use crate::ui::app::App;
 use crate::ui::color_by::ColorBy;
@@ -93,16 +93,19 @@ pub(in crate::ui) fn tint(app: &mut App, ctx: &Context, by: ColorBy) {
 
 /// Photo that looks most like the view, by place and direction, without those to be `left_out`.
 pub(in crate::ui) fn nearest_photo(app: &App, left_out: &BTreeSet<usize>) -> Option<usize> {
-    let (scene, eye) = (app.state.scene.as_ref()?, app.viewport.pose());
-    let photos = &scene.dataset.as_ref()?.photos;
-    let size = scene.home.bounds.radius();
-    let away = |i: &usize| {
-        let camera = &photos[*i].camera;
+    let photos = &app.state.scene.as_ref()?.dataset.as_ref()?.photos;
+    let all: Vec<usize> = (0..photos.len()).filter(|i| !left_out.contains(i)).collect();
+    nearest_camera(app, all.iter().map(|i| &photos[*i].camera)).map(|k| all[k])
+}
+
+/// Place of the camera that looks most like the view, by place and direction.
+pub(super) fn nearest_camera<'a>(app: &App, cameras: impl Iterator<Item = &'a Camera>) -> Option<usize> {
+    let (size, eye) = (app.state.scene.as_ref()?.home.bounds.radius(), app.viewport.pose());
+    let away = |camera: &Camera| {
         let turn = 1.0 - (camera.world_from_camera * DVec3::Z).dot(eye.world_from_camera * DVec3::Z);
         camera.center.distance(eye.center) / size + turn
     };
-    let all = (0..photos.len()).filter(|i| !left_out.contains(i));
-    all.min_by(|a, b| away(a).total_cmp(&away(b)))
+    cameras.map(away).enumerate().min_by(|a, b| a.1.total_cmp(&b.1)).map(|(k, _)| k)
 }
 
 /// Shows the photo beside the rendering, or not.

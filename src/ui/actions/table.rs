@@ -231,12 +231,25 @@ macro_rules! action_table {
                 => view::toggle_split(app);
             OtherView: "Switch view", "Keys, queries and colors act on it from now on.", "0"
                 => view::other_view(app);
-            ChooseComparison: "Compare with another scene\u{2026}",
-                "Show its Gaussians in the second view by the same camera: two trainings of the same photos."
-                => open::choose_comparison(app);
-            OpenComparison(path: Option<PathBuf>): path.as_ref().map_or_else(|| "End the comparison with another scene".into(),
-                    |p| format!("Compare with the scene {}", p.display())), "Show its Gaussians in the second view."
-                => open::compare_scene(app, path);
+            ChooseComparison: "Open to compare\u{2026}",
+                "Show another scene, or the result of another method, beside this one by the same camera; up to four."
+                => comparing::choose(app);
+            OpenComparison(path: PathBuf): format!("Compare with {}", path.display()), "Show it beside this scene."
+                => comparing::open(app, path);
+            CloseComparison(path: Option<PathBuf>): path.as_ref().map_or_else(|| "End the comparison".into(),
+                    |p| format!("Close {}", p.display())), "Close what is shown beside this scene."
+                => comparing::close(app, path.as_deref());
+            ChooseImport: "Import as a scene\u{2026}",
+                "Make a scene of the open result of another method: its objects can be named, edited, removed and asked."
+                => import::choose_folder(app);
+            Import(folder: PathBuf): format!("Import into {}", folder.display()),
+                "Make a scene of the open result of another method." => import::run(app, folder);
+            ChooseSheetFolder: "Save the comparison\u{2026}",
+                "Write table, pictures and page of what all scenes answer to the phrase, in the nearest photo's view."
+                => comparing::choose_sheet_folder(app);
+            SaveSheet(folder: PathBuf): format!("Save the comparison into {}", folder.display()),
+                "Write table, pictures and page of what all scenes answer to the phrase."
+                => comparing::save_sheet(app, folder);
             ToggleDim: "Dim everything else", "Darken everything except answers and the selection.", "9"
                 => app.layout.dim = !app.layout.dim;
             ToggleCameras: "Show or hide cameras", "Show the cameras of the nearest photos, while nothing is asked for, selected or in use.", "V"

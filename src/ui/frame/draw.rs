@@ -9,6 +9,7 @@ use crate::ui::ctx::Ctx;
 use crate::ui::dialogs;
 use crate::ui::dock::{DockContents, Place};
 use crate::ui::help;
+use crate::ui::object_menu::MenuThing;
 use crate::ui::palette::shortcut_sheet;
 use crate::ui::panes::log::LogPane;
 use crate::ui::panes::plan::PlanPane;
@@ -46,7 +47,10 @@ pub(super) fn over_everything(app: &mut App, ctx: &egui::Context) {
         dialogs::drop_hint(ctx);
     }
     let selection = app.state.semantics.as_ref().zip(app.viewport.picking.selected());
-    let selection = selection.map(|(map, id)| (&map.identities, id));
+    let selection = selection.map(|(map, id)| {
+        let is_hidden = app.viewport.visibility.draws(&map.identities, id) == Some(false);
+        MenuThing { all: &map.identities, id, is_hidden }
+    });
     if let Some(action) = app.palette.show(ctx, &app.layout, selection) {
         app.ask(action);
     }

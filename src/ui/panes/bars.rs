@@ -69,6 +69,10 @@ pub(crate) fn top(ui: &mut Ui, cx: &mut Ctx<'_>, view: &Viewport) {
             item(ui, has_scene, None, Action::ExportPage, cx);
             item(ui, has_scene, None, Action::Screenshot, cx);
             ui.separator();
+            let is_result = state.scene.as_ref().is_some_and(|scene| scene.method.is_some());
+            if is_result {
+                item(ui, true, None, Action::ChooseImport, cx);
+            }
             item(ui, has_scene, None, Action::SaveCopy, cx);
             item(ui, has_scene, None, Action::ShowFolder(None), cx);
             item(ui, has_scene, None, Action::DeleteRemoved, cx);
@@ -99,12 +103,8 @@ pub(crate) fn top(ui: &mut Ui, cx: &mut Ctx<'_>, view: &Viewport) {
             item(ui, has_photos, Some(cx.layout.compare), Action::ToggleCompare, cx);
             item(ui, has_scene, Some(cx.layout.split_view), Action::ToggleSplit, cx);
             item(ui, cx.layout.split_view, Some(false), Action::OtherView, cx);
-            let comparison = state
-                .comparison
-                .as_ref()
-                .filter(|_| cx.layout.split_view)
-                .map_or(Action::ChooseComparison, |_| Action::OpenComparison(None));
-            item(ui, has_scene, Some(false), comparison, cx);
+            item(ui, has_scene, Some(false), Action::ChooseComparison, cx);
+            item(ui, !state.beside.is_empty(), Some(false), Action::CloseComparison(None), cx);
             item(ui, state.semantics.is_some(), Some(cx.layout.dim), Action::ToggleDim, cx);
             item(ui, has_scene, Some(cx.layout.times), Action::ToggleTimes, cx);
             ui.separator();

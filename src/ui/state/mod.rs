@@ -48,8 +48,8 @@ pub struct ShownReport {
 pub struct AppState {
     /// The scene on screen.
     pub scene: Option<Arc<OpenedScene>>,
-    /// Another scene in the second view.
-    pub comparison: Option<ComparedScene>,
+    /// Other scenes beside it, each in a view of its own.
+    pub beside: Vec<ComparedScene>,
     /// The latest scene made by a removal.
     pub(crate) removed: Option<StoredRemoval>,
     /// Counts the scenes shown so far; changes when `scene` does.
@@ -257,7 +257,8 @@ impl AppState {
             self.remember(scene.path.clone());
         }
         self.scene_number += 1;
-        (self.explored, self.comparison, self.removed) = (None, None, None);
+        (self.explored, self.removed) = (None, None);
+        self.beside.clear();
         self.set_facts(scene.facts.clone());
         self.antialias = scene.settings.antialias;
         self.set_semantics(scene.semantics.clone());

@@ -11,13 +11,14 @@ use glam::{DVec2, DVec3};
 
 use super::eye::Eye;
 use super::frame_times::FrameTimes;
+use super::split::ViewArea;
 use crate::jobs::query::ViewMaps;
 use crate::render::DevicePicture;
 use crate::scene::Camera;
 use crate::scene::resource_log::{self, ResourceKind};
 use crate::ui::theme;
 use crate::worker::view::{MappedView, ViewPicture, ViewResult};
-use crate::worker::{Failure, Slot, Versioned};
+use crate::worker::{Slot, Versioned};
 
 /// Window of the frame rate, s.
 const RATE_SECS: f64 = 2.0;
@@ -36,8 +37,8 @@ pub(super) struct Display {
     texture: Option<TextureHandle>,
     /// Painter of frames on the window's device.
     native: Option<NativeTexture>,
-    /// Frame of the second view, if it differs.
-    second: Option<TextureHandle>,
+    /// Frames of the views beside the first, if they differ.
+    beside: Vec<Option<TextureHandle>>,
     error: Option<String>,
     /// Reason why there is no identity map of this view.
     unmapped: Option<String>,
@@ -95,7 +96,8 @@ impl Display {
 
     /// Forgets the frame of another scene.
     pub(super) fn clear(&mut self) {
-        (self.picture, self.texture, self.second, self.error, self.unmapped) = (None, None, None, None, None);
+        (self.picture, self.texture, self.error, self.unmapped) = (None, None, None, None);
+        self.beside.clear();
         self.native.iter_mut().for_each(|native| native.show(None));
     }
 
@@ -130,7 +132,7 @@ impl Display {
         let picture = match &*result {
             Ok(picture) => picture,
             Err(failure) => {
-                self.error = Some(report(failure));
+                self.error = Some(failure.in_a_line());
                 return;
             }
         };
@@ -148,9 +150,9 @@ impl Display {
             }
             Some(_) => {}
         }
-        match &picture.second {
-            Some(second) => upload(ctx, &mut self.second, size, &second.rgb),
-            None => self.second = None,
+        self.beside.resize_with(picture.beside.len(), || None);
+        for (texture, beside) in self.beside.iter_mut().zip(&picture.beside) {
+            upload(ctx, texture, size, &beside.rgb);
         }
         let now = ctx.input(|i| i.time);
         self.arrivals.retain(|at| now - at < RATE_SECS);
@@ -186,20 +188,21 @@ impl Display {
         }
         match &mapped.maps {
             Ok(maps) => return Some((Versioned::new(Arc::clone(maps)), mapped.exact)),
-            Err(failure) => self.unmapped = Some(report(failure)),
+            Err(failure) => self.unmapped = Some(failure.in_a_line()),
         }
         None
     }
 
-    /// Paints the frame of the first or second view into `shown`, a part of the view's `rect`.
-    pub(super) fn paint(&self, ui: &Ui, rect: Rect, shown: Rect, second: bool) {
+    /// Paints the frame of a view into a part of it.
+    pub(super) fn paint(&self, ui: &Ui, ViewArea { index, rect, shown, .. }: ViewArea) {
         // Filling the area under the frame would take a fifth of a redraw on an emulated adapter.
         let native = self.native.as_ref().and_then(|native| native.id);
         let first = native.or(self.texture.as_ref().map(TextureHandle::id));
         if first.is_none() || shown != rect {
             ui.painter().rect_filled(rect, 0.0, theme::canvas());
         }
-        if let Some(texture) = self.second.as_ref().filter(|_| second).map(TextureHandle::id).or(first) {
+        let beside = index.checked_sub(1).and_then(|k| self.beside.get(k)?.as_ref());
+        if let Some(texture) = beside.map(TextureHandle::id).or(first) {
             let uv = Rect::from_min_max(pos2(0.0, 0.0), pos2(1.0, 1.0));
             ui.painter().image(texture, shown, uv, Color32::WHITE);
         }
@@ -251,11 +254,6 @@ fn upload(ctx: &egui::Context, texture: &mut Option<TextureHandle>, size: [usize
     }
 }
 
-/// Error and remedy in one line.
-fn report(failure: &Failure) -> String {
-    format!("{} {}", failure.message, failure.remedy)
-}
-
 /// A frame of 4 x 4 px from `eye`, with depth 2 except at its first pixel.
 #[cfg(test)]
 pub(super) fn frame_of(ticket: u64, eye: &Eye) -> ViewPicture {
@@ -270,7 +268,7 @@ pub(super) fn frame_of(ticket: u64, eye: &Eye) -> ViewPicture {
         median_depth: Some(depth),
         depth_range: None,
         psnr: None,
-        second: None,
+        beside: Vec::new(),
         secs: 0.1,
         stages: Vec::new(),
         paint_secs: 0.0,
@@ -284,6 +282,7 @@ mod tests {
     use super::frame_of as frame;
     use super::*;
     use crate::scene::Bounds;
+    use crate::worker::Failure;
 
     fn failure() -> Failure {
         Failure::new("no", "wait")
@@ -353,7 +352,8 @@ mod tests {
             .build_ui(|ui| {
                 let rect = Rect::from_min_size(egui::Pos2::ZERO, size);
                 display.borrow_mut().take(ui.ctx(), &pictures);
-                display.borrow().paint(ui, rect, rect, false);
+                let area = ViewArea { index: 0, rect, shown: rect, second: false, is_other: false };
+                display.borrow().paint(ui, area);
             });
         let mut painted = |rgb: &[[u8; 3]], texture: Option<DevicePicture>| {
             let picture = ViewPicture { camera: camera.clone(), rgb: rgb.to_vec(), texture, ..frame(1, &eye) };

@@ -110,7 +110,7 @@ mod tests {
             median_depth: None,
             depth_range: None,
             psnr: None,
-            second: None,
+            beside: Vec::new(),
             secs: 0.5 + blend,
             stages: if stages { vec![("project", 0.25), ("blend", blend)] } else { Vec::new() },
             paint_secs: 0.125,

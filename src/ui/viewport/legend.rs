@@ -133,7 +133,7 @@ fn hatch(ui: &Ui, rect: Rect, colors: [[u8; 3]; 2], falling: bool) {
 }
 
 /// Draws a color map between the labels of its ends.
-fn bar(ui: &mut Ui, map: Colormap, ends: [String; 2]) {
+pub(super) fn bar(ui: &mut Ui, map: Colormap, ends: [String; 2]) {
     let (all, _) = ui.allocate_exact_size(vec2(220.0, 12.0), Sense::hover());
     let [from, to] = ends.map(|text| ui.painter().layout_no_wrap(text, FontId::proportional(11.5), theme::weak()));
     let (left, right) = (all.left() + from.size().x + 6.0, all.right() - to.size().x - 6.0);

@@ -7,6 +7,7 @@ use std::sync::Arc;
 use egui::{Color32, FontId, Painter, Pos2, Rect, Sense, Shape, Stroke, Ui, Vec2, pos2, vec2};
 use glam::DVec3;
 
+use super::numbers;
 use super::query::Queries;
 use super::visible::Visibility;
 use crate::navigate::target::Side;
@@ -67,14 +68,12 @@ impl Marks {
         cx: &mut Ctx<'_>,
     ) {
         let MarkedScene { cloud, semantics, visibility, selected, eye } = scene;
-        for (id, n) in queries.numbers().into_iter().take(MOST_NUMBERS) {
-            let center = semantics.identities.shapes.get(id).map(|s| s.center());
-            if let Some(at) =
-                center.and_then(|c| eye.project(c)).map(|p| place(shown, p)).filter(|p| shown.contains(*p))
-            {
-                number(&ui.painter_at(shown), at, n);
-            }
-        }
+        let numbers = queries.numbers().into_iter().take(MOST_NUMBERS).filter_map(|(id, n)| {
+            let center = semantics.identities.shapes.get(id)?.center();
+            let at = place(shown, eye.project(center)?);
+            shown.contains(at).then_some((at, n))
+        });
+        numbers::show(&ui.painter_at(shown), &numbers.collect::<Vec<_>>());
         let mut targets = queries.found_colors();
         targets.extend(selected.map(|id| (id, theme::accent())).filter(|t| targets.iter().all(|f| f.0 != t.0)));
         targets.retain(|(id, _)| {
@@ -145,12 +144,6 @@ fn sample(cloud: &GaussianCloud, semantics: &SemanticMap, id: IdentityId) -> Arc
         .filter(|p| bounds.as_ref().is_none_or(|b| p.cmpge(b.min).all() && p.cmple(b.max).all()))
         .copied()
         .collect()
-}
-
-/// Draws the number of a thing that was found together with others.
-fn number(painter: &Painter, at: Pos2, n: usize) {
-    painter.circle(at, 9.0, Color32::from_black_alpha(170), Stroke::new(1.0, Color32::from_white_alpha(160)));
-    painter.text(at, egui::Align2::CENTER_CENTER, n, FontId::proportional(12.0), Color32::WHITE);
 }
 
 /// Mark of an identity with a share of its points `in_view` and a span of `size` points, if known; `Some(None)` if it

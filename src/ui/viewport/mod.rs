@@ -1,6 +1,7 @@
 //! The viewport: shows the frames of the view thread and moves the camera.
 
 mod act;
+pub(crate) mod compared;
 mod display;
 pub mod eye;
 pub(crate) mod frame_times;
@@ -9,6 +10,7 @@ mod input;
 mod legend;
 mod marks;
 mod measured;
+mod numbers;
 mod outline;
 mod overlay;
 pub(crate) mod overrides;
@@ -28,6 +30,7 @@ use std::sync::Arc;
 
 use glam::DVec3;
 
+use self::compared::Compared;
 use self::display::Display;
 use self::eye::Eye;
 use self::input::Steering;
@@ -69,6 +72,8 @@ pub struct Viewport {
     moved_at: f64,
     /// Queries and their answers.
     pub queries: Queries,
+    /// The phrase that all scenes on screen are asked.
+    pub compared: Compared,
     /// Hidden parts of the scene.
     pub(crate) visibility: Visibility,
     /// Hovered and selected identity.
@@ -105,6 +110,7 @@ impl Viewport {
             steering: Steering::default(),
             moved_at: f64::NEG_INFINITY,
             queries: Queries::default(),
+            compared: Compared::default(),
             visibility: Visibility::default(),
             picking: Picking::default(),
             marks: Marks::default(),

@@ -3,11 +3,13 @@
 use egui::{Align2, Area, ComboBox, Id, Order, Rect, RichText, Ui, Vec2, vec2};
 use strum::VariantArray;
 
+use super::compared::AnswerFigures;
 use super::display::Display;
 use super::legend;
 use super::overrides::RenderOverrides;
 use super::photo::PhotoView;
 use super::query::Queries;
+use super::split::ViewArea;
 use super::visible::Visibility;
 use crate::jobs::remove::{Paint, RemovalOptions, RemoveRequest};
 use crate::math::format;
@@ -42,6 +44,10 @@ const NARROW_BESIDE_MODES: f32 = 640.0;
 /// Space of a letter of that name, points.
 const LETTER_PT: f32 = 7.8;
 
+/// Names of the cards of the views of other scenes.
+const NAMES: [&str; 3] = ["beside", "beside 2", "beside 3"];
+const FIGURES: [&str; 3] = ["figures beside", "figures beside 2", "figures beside 3"];
+
 /// Content of the cards over a view.
 pub(super) struct ViewCards<'a> {
     pub(super) display: &'a Display,
@@ -60,18 +66,20 @@ pub(super) struct ViewCards<'a> {
 
 impl ViewCards<'_> {
     /// Draws the cards over the active view.
-    pub(super) fn show(&mut self, ui: &Ui, rect: Rect, cx: &mut Ctx<'_>) {
-        let state = cx.state;
-        let second = self.queries.is_second();
+    pub(super) fn show(&mut self, ui: &Ui, area: ViewArea, figures: Option<AnswerFigures>, cx: &mut Ctx<'_>) {
+        let (state, ViewArea { rect, second, index, is_other, .. }) = (cx.state, area);
+        if index > 1 {
+            // The modes stand in the second view, for all beside the first.
+            return self.beside(ui, area, figures, cx);
+        }
         let dataset = state.scene.as_ref().and_then(|scene| scene.dataset.as_ref());
         let photos = dataset.map_or(0, |d| d.photos.len());
         let (modes, legend) = if second { ("second modes", "second legend") } else { ("modes", "legend") };
         let menus = cx.layout.split_view || rect.width() < NARROW;
-        let is_other = second && state.comparison.is_some();
         card(ui, rect, modes, Align2::LEFT_TOP, 0.0, |ui| {
             self.modes(ui, menus, is_other, photos > 0, cx);
         });
-        let other_depth = |p: &ViewPicture| p.second.as_ref().filter(|_| second).map(|other| other.depth_range);
+        let other_depth = |p: &ViewPicture| p.second().filter(|_| second).map(|other| other.depth_range);
         let depth = self.display.picture().and_then(|p| other_depth(p).unwrap_or(p.depth_range));
         if legend::is_needed(self.queries.settings(), depth) && rect.height() > LOW && !is_other {
             let shares = self.queries.maps().map(|m| [m.unknown_share(), m.invented_share()]);
@@ -93,13 +101,10 @@ impl ViewCards<'_> {
             });
         }
         if second {
-            if let Some(comparison) = &state.comparison {
-                // Beside the modes if there is room, else below them.
-                let is_wide = rect.width() > NARROW_BESIDE_MODES;
-                let (align, down) = if is_wide { (Align2::RIGHT_TOP, 0.0) } else { (Align2::LEFT_TOP, 46.0) };
-                card(ui, rect, "beside", align, down, |ui| self.comparison_bar(ui, comparison, rect.width(), cx));
-            }
-            return;
+            return self.beside(ui, area, figures, cx);
+        }
+        if let Some(figures) = figures {
+            card(ui, rect, "figures", Align2::RIGHT_BOTTOM, 0.0, |ui| figures.show(ui));
         }
         // In a low view the row is shown only with the name of the photo that the view looks through.
         if photos > 0 && (self.photo.is_some() || rect.height() > LOW) {
@@ -157,14 +162,34 @@ impl ViewCards<'_> {
         }
     }
 
-    /// Draws the name of the scene in the second view, and its quality, in a view of this width.
-    fn comparison_bar(&self, ui: &mut Ui, comparison: &ComparedScene, view_pt: f32, cx: &mut Ctx<'_>) {
+    /// Draws the cards of another scene: its name, and what it answers.
+    fn beside(&self, ui: &Ui, area: ViewArea, figures: Option<AnswerFigures>, cx: &mut Ctx<'_>) {
+        let Some((k, other)) = area.index.checked_sub(1).and_then(|k| Some((k, cx.state.beside.get(k)?))) else {
+            return;
+        };
+        let rect = area.rect;
+        // Beside the modes if there is room, else below them.
+        let is_wide = rect.width() > NARROW_BESIDE_MODES;
+        let (align, down) = match (k, is_wide) {
+            (0, true) => (Align2::RIGHT_TOP, 0.0),
+            (0, false) => (Align2::LEFT_TOP, 46.0),
+            _ => (Align2::LEFT_TOP, 0.0),
+        };
+        card(ui, rect, NAMES[k % NAMES.len()], align, down, |ui| {
+            self.name_of_other(ui, k, other, rect.width(), cx);
+        });
+        if let Some(figures) = figures {
+            card(ui, rect, FIGURES[k % FIGURES.len()], Align2::RIGHT_BOTTOM, 0.0, |ui| figures.show(ui));
+        }
+    }
+
+    /// Draws the name of another scene, and its quality, in a view of this width.
+    fn name_of_other(&self, ui: &mut Ui, k: usize, comparison: &ComparedScene, view_pt: f32, cx: &mut Ctx<'_>) {
         let state = cx.state;
         let removed = state.removed.as_ref().filter(|r| r.folder == comparison.path);
         let name = removed.map_or_else(|| comparison.name.clone(), |r| format!("without {}", r.name));
         let place = format!("{name}\n{}", comparison.path.display());
-        let psnr =
-            self.display.picture().and_then(|p| p.second.as_ref()?.psnr).filter(|_| view_pt > NARROW_BESIDE_MODES);
+        let psnr = self.display.picture().and_then(|p| p.beside.get(k)?.psnr).filter(|_| view_pt > NARROW_BESIDE_MODES);
         // The name gets what the buttons leave.
         let is_wide = view_pt > NARROW_BESIDE_MODES;
         let buttons_pt = match (&removed, is_wide) {
@@ -185,9 +210,10 @@ impl ViewCards<'_> {
         if let Some(psnr) = psnr {
             ui.colored_label(theme::accent(), psnr_text(psnr));
         }
-        let close = ui.button("\u{d7}").on_hover_text(Action::OpenComparison(None).text());
-        if close.accessible_name(Action::OpenComparison(None).text()).clicked() {
-            cx.ask(Action::OpenComparison(None));
+        let close = Action::CloseComparison(Some(comparison.path.clone()));
+        let button = ui.button("\u{d7}").on_hover_text(close.text());
+        if button.accessible_name(close.text()).clicked() {
+            cx.ask(close);
         }
     }
 

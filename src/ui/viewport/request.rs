@@ -71,7 +71,7 @@ mod tests {
                 camera: Camera::look_at(DVec3::ONE, DVec3::ZERO, DVec3::Z, 0.8, 8, 8).expect("valid"),
                 mode: ViewMode::Rgb,
                 second: None,
-                comparison: None,
+                others: Vec::new(),
                 settings: RenderSettings::default(),
                 budget: QualityBudget::Full,
                 photo: None,
@@ -99,8 +99,8 @@ mod tests {
         assert_eq!(next(&|w| w.photo = Some(Arc::clone(&photo))), Some((4, Moved::Nothing)));
         assert_eq!(next(&|w| w.second = Some(ViewMode::Depth)), Some((5, Moved::Nothing)));
         let other = Versioned::new(Arc::clone(&cloud));
-        let comparison = |w: &mut ViewRequest| w.comparison = Some((other.clone(), RenderSettings::default()));
-        assert_eq!(next(&comparison), Some((6, Moved::Nothing)));
+        let others = |w: &mut ViewRequest| w.others.push((other.clone(), RenderSettings::default()));
+        assert_eq!(next(&others), Some((6, Moved::Nothing)));
         assert_eq!(next(&|w| w.camera.center.x += 1.0), Some((7, Moved::Eye)));
         assert_eq!(next(&|_| {}), Some((8, Moved::Eye)), "and back");
         // The same Gaussians in a new generation.

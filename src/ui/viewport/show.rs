@@ -1,6 +1,7 @@
 //! One pass of the viewport: its views, their frames, and all that is drawn over them.
 
-use egui::{Rect, Response, Sense, Ui};
+use egui::{Frame, Margin, Panel, Rect, Response, Sense, Ui};
+use glam::DVec2;
 
 use super::input::SteeredView;
 use super::marks::MarkedScene;
@@ -20,6 +21,7 @@ use crate::pipeline::semantics::query::language::viewpoint::Viewpoint;
 use crate::scene::measurement::Measurement;
 use crate::ui::ctx::Ctx;
 use crate::ui::select_shape::SelectShape;
+use crate::ui::theme;
 use crate::worker::ViewMode;
 use crate::worker::view::{QualityBudget, SkipPasses, ViewRequest};
 
@@ -33,16 +35,21 @@ impl Viewport {
     pub(crate) fn show(&mut self, ui: &mut Ui, cx: &mut Ctx<'_>, route: Option<&CameraRoute>) {
         let state = cx.state;
         let Some(scene) = &state.scene else { return };
+        self.compared.follow(state, cx.layout.split_view);
+        if self.compared.is_on() {
+            let frame = Frame::new().fill(theme::panel()).inner_margin(Margin::symmetric(10, 6));
+            Panel::top("compared").frame(frame).show(ui, |ui| self.compared.bar(ui, cx));
+        }
         let whole = ui.available_rect_before_wrap();
         let response = ui.allocate_rect(whole, Sense::click_and_drag());
         response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Image, true, "Viewport"));
-        let views = Views::of(whole, cx.layout.split_view);
+        let views = Views::of(whole, if cx.layout.split_view { 1 + state.beside.len().max(1) } else { 1 });
         if let Some(second) = views.pressed(ui) {
             self.queries.work_in(second);
         }
         self.display.time_frames(cx.layout.times);
         self.take_frame(ui.ctx());
-        let (now, has_other) = (ui.input(|i| i.time), state.comparison.is_some());
+        let (now, has_other) = (ui.input(|i| i.time), !state.beside.is_empty());
         let under = views.area_under_pointer(ui, self.fit(views.first), has_other);
         if let Some((tool, mut rest)) = self.tool_in_use() {
             tool.pointer(&response, under, &mut rest, cx);
@@ -72,8 +79,16 @@ impl Viewport {
         let areas: Vec<ViewArea> = views.areas(shown, has_other).collect();
         let is_second = self.queries.is_second();
         let with_cameras = cx.layout.cameras && self.has_nothing_to_look_at() && !route.is_some_and(|r| r.plays);
+        self.compared.keep_up(ui.ctx(), self.display.picture());
         let on_camera = self.show_frames(ui, &areas, &response, with_cameras, cx);
-        let picks = !takes_drags && !takes_clicks;
+        let asks_all = self.compared.is_on();
+        if asks_all && !takes_drags && !takes_clicks && response.clicked() && !on_camera {
+            let under = views.area_under_pointer(ui, shown, has_other);
+            let at = response.interact_pointer_pos().map(|pos| (pos - under.shown.min) / under.shown.size());
+            let point = at.and_then(|at| self.display.picked(DVec2::new(f64::from(at.x), f64::from(at.y)), &self.eye));
+            self.compared.point_at(point);
+        }
+        let picks = !takes_drags && !takes_clicks && !asks_all;
         if let Some(semantics) = state.semantics.as_ref().filter(|_| picks) {
             let under = views.area_under_pointer(ui, shown, has_other);
             let maps = self.queries.maps().map(|m| &***m).filter(|_| !on_camera && !under.is_other);
@@ -137,9 +152,11 @@ impl Viewport {
         let (mut on_camera, selects) = (false, self.is_selecting());
         for area in areas {
             self.queries.work_in(area.second);
-            self.display.paint(ui, area.rect, area.shown, area.second);
+            self.display.paint(ui, *area);
             // Answers belong to the scene, not to another one beside it.
-            if let Some(semantics) = state.semantics.as_ref().filter(|_| !area.is_other && !selects) {
+            if let Some(semantics) =
+                state.semantics.as_ref().filter(|_| !area.is_other && !selects && !self.compared.is_on())
+            {
                 let lit = cx.layout.dim.then(|| self.picking.selected().into_iter().collect());
                 self.queries.paint(ui, area.shown, semantics, lit);
             }
@@ -163,6 +180,7 @@ impl Viewport {
                 on_camera |= frusta::show(ui, area.rect, &eye, response, cx);
             }
         }
+        self.compared.paint(ui, areas, self.display.picture());
         on_camera
     }
 
@@ -179,6 +197,7 @@ impl Viewport {
     ) -> bool {
         let (state, now) = (cx.state, ui.input(|i| i.time));
         let (first, mut works_in) = (areas.first().map_or(Rect::NOTHING, |area| area.rect), is_second);
+        let truth = self.queries.truth();
         for &area in areas {
             self.queries.work_in(area.second);
             if let Some((tool, mut rest)) = self.tool_in_use() {
@@ -218,14 +237,14 @@ impl Viewport {
                 orthographic: self.eye.straight_name(state.scene.as_ref().map(|scene| &scene.home)),
                 queries: &mut self.queries,
             };
-            cards.show(ui, area.rect, cx);
-            if let Some((semantics, cloud)) = searched {
+            cards.show(ui, area, self.compared.figures(area.index, truth.as_deref()), cx);
+            if let Some((semantics, cloud)) = searched.filter(|_| !self.compared.is_on()) {
                 let scene = SearchedScene { semantics, cloud, visibility: &self.visibility };
                 if query::panel::show(ui, &mut self.queries, area.rect, first, scene, cx) {
                     works_in = area.second;
                 }
             }
-            if areas.len() > 1 && works_in == area.second {
+            if areas.len() == 2 && works_in == area.second {
                 split::mark_worked_in(ui, area.rect);
             }
         }
@@ -284,14 +303,14 @@ impl Viewport {
             Some(p) => p.camera().resized(w, h),
             None => self.eye.camera(w, h),
         };
-        let differs = |mode: &ViewMode| *mode != layout.mode || state.comparison.is_some();
-        let comparison = state.comparison.as_ref().filter(|_| layout.split_view);
+        let differs = |mode: &ViewMode| *mode != layout.mode || !state.beside.is_empty();
+        let others = state.beside.iter().filter(|_| layout.split_view);
         let wanted = ViewRequest {
             cloud,
             camera: camera.limited_to(MAX_SIDE_PX),
             mode: layout.mode,
             second: Some(layout.second_mode).filter(|_| layout.split_view).filter(differs),
-            comparison: comparison.map(|b| (b.cloud.clone(), b.settings.clone())),
+            others: others.map(|b| (b.cloud.clone(), b.settings.clone())).collect(),
             settings: self.overrides.over(state.render_settings(), self.on_gpu()),
             budget,
             photo: self.photo.as_ref().and_then(PhotoView::pixels),

@@ -1,6 +1,7 @@
 //! The whole window, headless: the user's view and actions, with the software adapter.
 
 mod appearance;
+mod comparing;
 mod crop;
 mod demo;
 mod doubts;

@@ -13,8 +13,8 @@ fn a_scene_without_a_box_is_seen_beside_and_opened() {
     let mut w = window(folder.path());
     let before = std::fs::read(folder.path().join("scene/point_cloud.ply")).expect("the scene");
     w.ask(Action::Remove(2));
-    w.until("the scene without it", |a| a.state.comparison.is_some());
-    w.until("both views", |a| a.viewport.picture().is_some_and(|p| p.second.is_some()));
+    w.until("the scene without it", |a| !a.state.beside.is_empty());
+    w.until("both views", |a| a.viewport.picture().is_some_and(|p| p.second().is_some()));
     assert!(w.shows("without box 1") && w.app().layout.split_view);
     let made = folder.path().join("scene-without-box-1");
     assert!(made.join("scene.json").is_file());
@@ -28,7 +28,7 @@ fn a_scene_without_a_box_is_seen_beside_and_opened() {
     w.click("Another fill");
     let again = folder.path().join("scene-without-box-1-2");
     w.until("another one", |_| again.join("scene.json").is_file());
-    w.until("it is shown", |a| a.state.comparison.as_ref().is_some_and(|b| b.path == again));
+    w.until("it is shown", |a| a.state.beside.first().is_some_and(|b| b.path == again));
     w.harness.run_steps(2);
 
     // One that is not wanted is deleted, once that is said twice, but not with what others put there.
@@ -47,21 +47,21 @@ fn a_scene_without_a_box_is_seen_beside_and_opened() {
     assert!(w.app().state.log.iter().any(|line| line.text.contains("holds more than the scene")));
     std::fs::remove_file(&other).expect("removed");
     answer(&mut w, "Cancel");
-    assert!(again.join("scene.json").is_file() && w.app().state.comparison.is_some());
+    assert!(again.join("scene.json").is_file() && !w.app().state.beside.is_empty());
     answer(&mut w, "Delete");
-    assert!(!again.exists() && made.join("scene.json").is_file() && w.app().state.comparison.is_none());
+    assert!(!again.exists() && made.join("scene.json").is_file() && w.app().state.beside.is_empty());
     w.ask(Action::Remove(2));
-    w.until("it is made once more", |a| a.state.comparison.as_ref().is_some_and(|b| b.path == again));
+    w.until("it is made once more", |a| a.state.beside.first().is_some_and(|b| b.path == again));
     w.harness.run_steps(2);
 
     w.harness.get_by_role_and_label(Role::Button, "Open").click();
     w.until("two boxes", |a| a.state.semantics.as_ref().is_some_and(|m| m.identities.len() == 2));
-    assert!(w.app().state.comparison.is_none());
+    assert!(w.app().state.beside.is_empty());
     assert_eq!(std::fs::read(folder.path().join("scene/point_cloud.ply")).expect("the scene"), before);
     // What is shown now is the second one, from which more can be removed.
     w.ask(Action::Remove(1));
     let third = folder.path().join("scene-without-box-1-2-without-box-0");
-    w.until("less again", |a| third.join("scene.json").is_file() && a.state.comparison.is_some());
+    w.until("less again", |a| third.join("scene.json").is_file() && !a.state.beside.is_empty());
 
     // The one beside is deleted first, then the open one; the next in the list of recent scenes takes its place.
     for gone in [&third, &again] {

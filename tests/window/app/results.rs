@@ -10,7 +10,7 @@ use super::Window;
 use crate::cli_support::copy;
 
 /// A copy of a sample.
-fn sample(name: &str, folder: &Path) -> std::path::PathBuf {
+pub(crate) fn sample(name: &str, folder: &Path) -> std::path::PathBuf {
     let run = folder.join("run");
     copy(&Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/results").join(name), &run);
     run

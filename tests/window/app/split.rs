@@ -84,7 +84,7 @@ fn two_views_have_one_camera_and_their_own_queries_and_colors() {
     w.harness.run_steps(80);
     w.press(Key::Num5);
     assert_eq!((w.app().layout.mode, w.app().layout.second_mode), (ViewMode::Rgb, ViewMode::Depth));
-    w.until("depths", |a| a.viewport.picture().is_some_and(|p| p.second.as_ref().is_some_and(|s| s.rgb != p.rgb)));
+    w.until("depths", |a| a.viewport.picture().is_some_and(|p| p.second().is_some_and(|s| s.rgb != p.rgb)));
     w.press(Key::Num0);
     assert!(!w.app().viewport.queries.is_second());
     click(&mut w, right.center_bottom() - vec2(0.0, 20.0));
@@ -96,7 +96,7 @@ fn two_views_have_one_camera_and_their_own_queries_and_colors() {
     let at = left.center() + vec2(0.0, 150.0);
     drag(&mut w, [at, at + vec2(60.0, 0.0)], Modifiers::NONE);
     w.until("another picture of both", |a| {
-        a.viewport.picture().is_some_and(|p| p.camera.center != before && p.second.is_some())
+        a.viewport.picture().is_some_and(|p| p.camera.center != before && p.second().is_some())
     });
     assert!(!w.app().viewport.queries.is_second());
     w.until("rest", at_rest);
@@ -113,7 +113,7 @@ fn two_views_have_one_camera_and_their_own_queries_and_colors() {
 
     w.press(Key::Num8);
     w.until("one view", |a| a.viewport.picture().is_some_and(|p| p.full && p.camera.width_px == whole));
-    assert!(!w.app().layout.split_view && w.app().viewport.picture().expect("drawn").second.is_none());
+    assert!(!w.app().layout.split_view && w.app().viewport.picture().expect("drawn").second().is_none());
     assert_eq!(found(&mut w)[0], [1], "the first goes on");
     w.harness.key_press_modifiers(Modifiers::COMMAND, Key::Z);
     w.harness.run_steps(3);
@@ -223,14 +223,14 @@ fn another_scene_is_seen_beside_by_the_same_camera() {
     fmlgs::io::splat_ply::write(&path, &other).expect("write");
     let mut w = Window::new(Some(Action::Open(splat.clone())));
     w.until("a picture", |a| a.viewport.picture().is_some_and(|p| p.full));
-    w.ask(Action::OpenComparison(Some(path)));
-    w.until("both", |a| a.viewport.picture().is_some_and(|p| p.full && p.second.is_some()));
+    w.ask(Action::OpenComparison(path));
+    w.until("both", |a| a.viewport.picture().is_some_and(|p| p.full && p.second().is_some()));
     w.harness.run_steps(3);
-    let name = w.app().state.comparison.as_ref().expect("open").name.clone();
+    let name = w.app().state.beside.first().expect("open").name.clone();
     assert!(w.app().layout.split_view && name.starts_with("other") && w.shows(&name));
     let swapped = |a: &App| {
         let p = a.viewport.picture().expect("drawn");
-        let second = &p.second.as_ref().expect("two views").rgb;
+        let second = &p.second().expect("two views").rgb;
         second.iter().zip(&p.rgb).all(|(b, a)| [b[2], b[1], b[0]] == *a)
     };
     assert!(swapped(w.app()), "red and blue are exchanged, all else is the same");
@@ -242,13 +242,14 @@ fn another_scene_is_seen_beside_by_the_same_camera() {
     w.until("both from elsewhere", |a| a.viewport.picture().is_some_and(|p| p.full && p.camera.center != before));
     assert!(swapped(w.app()));
     // The control: beside itself it looks the same, so nothing is exchanged.
-    w.ask(Action::OpenComparison(Some(splat)));
-    w.until("itself", |a| a.viewport.picture().is_some_and(|p| p.second.as_ref().is_some_and(|s| s.rgb == p.rgb)));
+    w.ask(Action::CloseComparison(None));
+    w.ask(Action::OpenComparison(splat));
+    w.until("itself", |a| a.viewport.picture().is_some_and(|p| p.second().is_some_and(|s| s.rgb == p.rgb)));
     assert!(!swapped(w.app()));
-    w.ask(Action::OpenComparison(Some(folder.path().join("nothing.ply"))));
+    w.ask(Action::OpenComparison(folder.path().join("nothing.ply")));
     w.until("an error", |a| a.state.error.is_some());
-    assert!(w.app().state.comparison.is_some() && w.app().state.scene.is_some(), "nothing is lost");
+    assert!(!w.app().state.beside.is_empty() && w.app().state.scene.is_some(), "nothing is lost");
     w.harness.state_mut().state.error = None;
-    w.ask(Action::OpenComparison(None));
-    w.until("one scene", |a| a.viewport.picture().is_some_and(|p| p.full && p.second.is_none()));
+    w.ask(Action::CloseComparison(None));
+    w.until("one scene", |a| a.viewport.picture().is_some_and(|p| p.full && p.second().is_none()));
 }

@@ -31,7 +31,7 @@ fn colored(w: &mut Window, color: [u8; 3]) -> usize {
 }
 
 /// Returns whether the window shows a text once the worker has got on.
-fn shows_soon(w: &mut Window, text: &str) -> bool {
+pub(crate) fn shows_soon(w: &mut Window, text: &str) -> bool {
     for _ in 0..2_000 {
         if w.shows(text) {
             return true;
@@ -106,7 +106,7 @@ fn both_views_of_a_removal_show_its_place_and_opening_it_keeps_camera_and_query(
     w.harness.key_up(Key::D);
     w.ask(Action::Remove(2));
     w.until("both views of it", |a| {
-        a.state.comparison.is_some() && a.viewport.picture().is_some_and(|p| p.full && p.second.is_some()) && seen(a)
+        !a.state.beside.is_empty() && a.viewport.picture().is_some_and(|p| p.full && p.second().is_some()) && seen(a)
     });
     w.harness.run_steps(3);
     let place = center(w.app());

@@ -266,7 +266,7 @@ pub(in crate::ui) fn submit_removal(app: &mut App, request: RemoveRequest) {
         let Some(removed) = removed else { return };
         app.state.result(removal::summary(&removed.name, &removed.report));
         app.state.say(Tone::Info, format!("Saved to {}", removed.folder.display()));
-        super::open::compare_scene(app, Some(removed.folder.clone()));
+        super::comparing::open(app, removed.folder.clone());
         // Both views show the place of what was removed.
         let all = removed.request.options.ids.iter().filter_map(|id| app.viewport.bounds_of(*id, &app.state));
         if let Some(bounds) = all.reduce(|a, b| Bounds { min: a.min.min(b.min), max: a.max.max(b.max) }) {
@@ -295,7 +295,7 @@ fn delete_removed(app: &mut App) {
     let Some(removed) = app.state.removed.take() else { return };
     match removed.delete() {
         Ok(()) => {
-            app.state.comparison = app.state.comparison.take().filter(|comparison| comparison.path != removed.folder);
+            app.state.beside.retain(|other| other.path != removed.folder);
             app.state.toast(Tone::Good, format!("Deleted {}", removed.folder.display()));
         }
         Err(e) => {

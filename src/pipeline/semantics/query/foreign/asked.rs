@@ -4,11 +4,13 @@ use std::sync::Arc;
 
 use rayon::prelude::*;
 
-use super::blend::{self, BlendedCodes};
+use super::blend::{self, BlendedCodes, BlendedCosines};
 use super::cosines::CosineHead;
 use super::descriptors::{self, DescriptorAnswer};
+use super::packed::PackedWeights;
+use super::pieces::{self, KnownCosines, PieceCosines};
 use super::{ForeignError, ForeignPhrase};
-use crate::io::results::{ClusterLevel, LevelValues, MethodResult, ResultLevel};
+use crate::io::results::{ClusterLevel, LevelCodes, LevelValues, MethodResult, ResultLevel};
 use crate::math::vector::{dot, unit};
 use crate::pipeline::semantics::relevancy::{nearest, score};
 use crate::render::{LabelWinner, RenderSettings, Renderer};
@@ -32,6 +34,8 @@ pub struct ForeignScene {
 pub(crate) enum LevelView {
     /// The blended numbers.
     Blended(BlendedCodes),
+    /// The blended weights of a codebook's entries.
+    Packed(PackedWeights),
     /// Cluster of largest weight at each pixel, numbered from 1; 0 for none.
     Winners(Vec<LabelWinner>),
     /// Embeddings that are blended anew for every question.
@@ -51,8 +55,31 @@ impl ForeignView {
     pub fn blended(&self, level: usize) -> Option<&BlendedCodes> {
         match self.levels.get(level)? {
             LevelView::Blended(blended) => Some(blended),
-            LevelView::Winners(_) | LevelView::Wide => None,
+            LevelView::Packed(_) | LevelView::Winners(_) | LevelView::Wide => None,
         }
+    }
+
+    /// Share of the pixels of a level that a Gaussian reaches; only these are decoded.
+    pub(crate) fn reached(&self, level: usize) -> Option<f64> {
+        let reached = match self.levels.get(level)? {
+            LevelView::Blended(blended) => blended.alpha.iter().filter(|a| **a != 0.0).count(),
+            LevelView::Packed(packed) => packed.reached(),
+            LevelView::Winners(winners) => winners.iter().filter(|w| w.label != 0).count(),
+            LevelView::Wide => return None,
+        };
+        let (w, h) = self.size();
+        Some(reached as f64 / (w * h).max(1) as f64)
+    }
+
+    /// Memory of what is kept of the view.
+    pub(crate) fn bytes(&self) -> usize {
+        let of = |level: &LevelView| match level {
+            LevelView::Blended(blended) => (blended.planes.len() + 1) * size_of_val(&blended.alpha[..]),
+            LevelView::Packed(packed) => packed.bytes(),
+            LevelView::Winners(winners) => size_of_val(&winners[..]),
+            LevelView::Wide => 0,
+        };
+        self.levels.iter().map(of).sum()
     }
 
     pub(crate) fn size(&self) -> (usize, usize) {
@@ -81,8 +108,14 @@ impl ForeignScene {
         for (level, head) in self.result.levels.iter().zip(&self.heads) {
             levels.push(match (&level.values, head) {
                 (LevelValues::Embedded(e), Some(head)) if head.is_plain() && e.codes.dim() > WIDE => LevelView::Wide,
-                (LevelValues::Embedded(e), _) => {
-                    LevelView::Blended(blend::blend_level(renderer, &level.cloud, e, camera)?)
+                (LevelValues::Embedded(e), head) => {
+                    let blended = blend::blend_level(renderer, &level.cloud, e, camera)?;
+                    match (&e.codes, head) {
+                        (LevelCodes::Sparse(_), Some(head)) if head.is_codebook() => {
+                            LevelView::Packed(PackedWeights::new(head, &blended))
+                        }
+                        _ => LevelView::Blended(blended),
+                    }
                 }
                 (LevelValues::Classes { features, .. } | LevelValues::Affinity { features, .. }, _) => {
                     LevelView::Blended(blend::blend_rows(renderer, &level.cloud, features, camera)?)
@@ -104,7 +137,8 @@ impl ForeignScene {
         match phrases.iter().map(|p| p.len()).find(|have| *have != want) {
             None => Ok(()),
             Some(have) => {
-                let encoder = method.encoder().or(method.missing_encoder()).unwrap_or_default();
+                let missing = || method.missing_encoder().map(str::to_owned);
+                let encoder = self.result.encoder.clone().or_else(missing).unwrap_or_default();
                 Err(ForeignError::Dimension { have, want, method: method.name(), encoder })
             }
         }
@@ -142,7 +176,7 @@ impl ForeignScene {
             let one = |c: &Option<u32>| c.map_or(0.0, |c| relevancy[c as usize]);
             return Ok(clusters.of.par_iter().map(one).collect());
         }
-        Ok(relevancy_of(&self.gaussian_cosines(level, &all_of(phrase))?, phrase.temperature, 0.0))
+        Ok(relevancy_of(&self.gaussian_cosines(level, &all_of(phrase))?, phrase.temperature))
     }
 
     /// Relevancy of each cluster, times its weight if it has several embeddings; 0 for those without one.
@@ -163,7 +197,33 @@ impl ForeignScene {
         let all = all_of(phrase);
         self.fits(clusters.features.dim(), &all)?;
         let cosines = cluster_cosines(clusters, &all);
-        Ok(descriptors::answers(clusters, &relevancy_of(&cosines, phrase.temperature, 0.0), &cosines[0]))
+        Ok(descriptors::answers(clusters, &relevancy_of(&cosines, phrase.temperature), &cosines[0]))
+    }
+
+    /// Prepares the comparison of the pixels of a view with phrases, by the codes of a level.
+    fn compared<'a>(
+        &'a self,
+        renderer: &mut Renderer,
+        view: &'a ForeignView,
+        level: usize,
+        phrases: &[&[f32]],
+    ) -> Result<Box<dyn PieceCosines + 'a>, ForeignError> {
+        let of = self.level(level)?;
+        let (LevelValues::Embedded(embedded), Some(head)) = (&of.values, &self.heads[level]) else {
+            return Err(self.no_language());
+        };
+        self.fits(head.outputs(), phrases)?;
+        match view.levels.get(level) {
+            Some(LevelView::Wide) => {
+                let cosines = blend::wide_cosines(renderer, &of.cloud, embedded, &view.camera, phrases)?;
+                Ok(Box::new(KnownCosines(cosines)))
+            }
+            Some(LevelView::Blended(blended)) => {
+                Ok(Box::new(BlendedCosines::new(head, blended, head.directions(phrases))))
+            }
+            Some(LevelView::Packed(packed)) => Ok(Box::new(packed.compared(&head.directions(phrases)))),
+            Some(LevelView::Winners(_)) | None => Err(self.no_language()),
+        }
     }
 
     /// Cosines of each pixel of a view with each phrase, by the blended codes of a level.
@@ -174,18 +234,7 @@ impl ForeignScene {
         level: usize,
         phrases: &[&[f32]],
     ) -> Result<Vec<Vec<f32>>, ForeignError> {
-        let of = self.level(level)?;
-        match (&of.values, view.levels.get(level), &self.heads[level]) {
-            (LevelValues::Embedded(embedded), Some(LevelView::Wide), Some(head)) => {
-                self.fits(head.outputs(), phrases)?;
-                blend::wide_cosines(renderer, &of.cloud, embedded, &view.camera, phrases)
-            }
-            (LevelValues::Embedded(_), Some(LevelView::Blended(blended)), Some(head)) => {
-                self.fits(head.outputs(), phrases)?;
-                Ok(blend::pixel_cosines(head, blended, &head.directions(phrases)))
-            }
-            _ => Err(self.no_language()),
-        }
+        Ok(pieces::planes(&*self.compared(renderer, view, level, phrases)?))
     }
 
     /// Relevancy of each pixel of a view, 0 to 1: of its blended embedding, or of the cluster of largest weight. It is 0
@@ -197,32 +246,6 @@ impl ForeignScene {
         level: usize,
         phrase: ForeignPhrase<'_>,
     ) -> Result<Vec<f32>, ForeignError> {
-        let mut relevancy = self.relevancy_everywhere(renderer, view, level, phrase, 0.0)?;
-        if let Some(blended) = view.blended(level) {
-            relevancy.iter_mut().zip(&blended.alpha).filter(|(_, a)| **a == 0.0).for_each(|(r, _)| *r = 0.0);
-        }
-        Ok(relevancy)
-    }
-
-    /// As [`Self::pixel_relevancy`], with the relevancy that the methods compute where nothing is.
-    pub(crate) fn relevancy_of_method(
-        &self,
-        renderer: &mut Renderer,
-        view: &ForeignView,
-        level: usize,
-        phrase: ForeignPhrase<'_>,
-    ) -> Result<Vec<f32>, ForeignError> {
-        self.relevancy_everywhere(renderer, view, level, phrase, UNDECIDED)
-    }
-
-    fn relevancy_everywhere(
-        &self,
-        renderer: &mut Renderer,
-        view: &ForeignView,
-        level: usize,
-        phrase: ForeignPhrase<'_>,
-        of_nothing: f32,
-    ) -> Result<Vec<f32>, ForeignError> {
         if let (LevelValues::Clusters(clusters), Some(LevelView::Winners(winners))) =
             (&self.level(level)?.values, view.levels.get(level))
         {
@@ -230,8 +253,35 @@ impl ForeignScene {
             let of = |w: &LabelWinner| w.label.checked_sub(1).and_then(|c| relevancy.get(c as usize)).copied();
             return Ok(winners.iter().map(|w| of(w).unwrap_or(0.0)).collect());
         }
-        let cosines = self.pixel_cosines(renderer, view, level, &all_of(phrase))?;
-        Ok(relevancy_of(&cosines, phrase.temperature, of_nothing))
+        let cosines = self.compared(renderer, view, level, &all_of(phrase))?;
+        Ok(pieces::relevancy(&*cosines, phrase.temperature))
+    }
+
+    /// Relevancy of all levels, of which masks are made.
+    pub fn relevancy(
+        &self,
+        renderer: &mut Renderer,
+        view: &ForeignView,
+        phrase: ForeignPhrase<'_>,
+    ) -> Result<Vec<Vec<f32>>, ForeignError> {
+        (0..self.result.levels.len()).map(|level| self.pixel_relevancy(renderer, view, level, phrase)).collect()
+    }
+
+    /// Relevancy that the methods compute where nothing is.
+    pub(crate) fn of_nothing(&self, view: &ForeignView, level: usize, phrase: ForeignPhrase<'_>) -> f32 {
+        match (view.levels.get(level), self.heads.get(level)) {
+            (Some(LevelView::Winners(_)), _) => 0.0,
+            (Some(LevelView::Blended(blended)), Some(Some(head))) => {
+                let compared = BlendedCosines::new(head, blended, head.directions(&all_of(phrase)));
+                match compared.of_nothing() {
+                    [query, canonical @ ..] if compared.of_nothing().iter().any(|c| *c != 0.0) => {
+                        score(query - nearest(canonical.iter().copied()), phrase.temperature)
+                    }
+                    _ => UNDECIDED,
+                }
+            }
+            _ => UNDECIDED,
+        }
     }
 }
 
@@ -240,12 +290,12 @@ fn all_of<'a>(phrase: ForeignPhrase<'a>) -> Vec<&'a [f32]> {
     std::iter::once(phrase.query).chain(phrase.canonical.iter().map(Vec::as_slice)).collect()
 }
 
-/// Relevancy from the cosines with the phrase, and those with the canonical phrases. What has no direction, and so
-/// cosines of 0 with all, gets `of_nothing`.
-fn relevancy_of(cosines: &[Vec<f32>], temperature: f32, of_nothing: f32) -> Vec<f32> {
+/// Relevancy from the cosines with the phrase, and those with the canonical phrases; 0 for what has no direction, and so
+/// cosines of 0 with all.
+fn relevancy_of(cosines: &[Vec<f32>], temperature: f32) -> Vec<f32> {
     let Some((query, canonical)) = cosines.split_first() else { return Vec::new() };
     let one = |i: usize| match cosines.iter().all(|c| c[i] == 0.0) {
-        true => of_nothing,
+        true => 0.0,
         false => score(query[i] - nearest(canonical.iter().map(|c| c[i])), temperature),
     };
     (0..query.len()).into_par_iter().with_min_len(1 << 12).map(one).collect()

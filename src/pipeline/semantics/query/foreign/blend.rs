@@ -4,6 +4,7 @@ use rayon::prelude::*;
 
 use super::ForeignError;
 use super::cosines::{BLOCK, CosineHead, Directions};
+use super::pieces::{self, PIECE, PieceCosines};
 use crate::io::results::{EmbeddedLevel, FeatureRows, LevelCodes};
 use crate::render::{Features, MAX_CHANNELS, RenderSettings, Renderer};
 use crate::scene::{Camera, GaussianCloud};
@@ -37,7 +38,12 @@ pub(crate) struct BlendSource<'a> {
     pub(crate) copy: &'a (dyn Fn(usize, usize, &mut [f32]) + Sync),
 }
 
-/// Factor of each Gaussian's code: one, or that which gives it unit length.
+/// Factor of a code: one, or that which gives it unit length.
+pub(crate) fn factor(level: &EmbeddedLevel, code: &[f32]) -> f32 {
+    if level.is_unit { 1.0 / (code.iter().map(|v| v * v).sum::<f32>().sqrt() + TINY) } else { 1.0 }
+}
+
+/// Factors of the codes of all Gaussians.
 fn factors(level: &EmbeddedLevel) -> Vec<f32> {
     let codes = &level.codes;
     if !level.is_unit {
@@ -46,7 +52,7 @@ fn factors(level: &EmbeddedLevel) -> Vec<f32> {
     let dim = codes.dim();
     let one = |own: &mut Vec<f32>, i: usize| {
         codes.copy(i, 0, own);
-        1.0 / (own.iter().map(|v| v * v).sum::<f32>().sqrt() + TINY)
+        factor(level, own)
     };
     (0..codes.len()).into_par_iter().with_min_len(GAUSSIANS_PER_TASK).map_init(|| vec![0.0; dim], one).collect()
 }
@@ -144,33 +150,60 @@ pub(crate) fn wide_cosines(
     Ok(sums)
 }
 
-/// Cosines of the pixels of a view with phrases. Blocks of pixels that no Gaussian reaches are not decoded: they have
-/// the cosines of the code of zeros.
-pub(crate) fn pixel_cosines(head: &CosineHead, blended: &BlendedCodes, directions: &Directions) -> Vec<Vec<f32>> {
-    let mut of_nothing = vec![0.0; directions.len() * BLOCK];
-    head.cosines(&vec![0.0; blended.planes.len() * BLOCK], directions, &mut of_nothing);
-    let blocks = blended.alpha.len().div_ceil(BLOCK);
-    let one = |b: usize| -> Vec<f32> {
-        let pixels = b * BLOCK..blended.alpha.len().min((b + 1) * BLOCK);
-        if blended.alpha[pixels.clone()].iter().all(|a| *a == 0.0) {
-            return of_nothing.clone();
+/// Cosines of blended codes with phrases. Only pixels that a Gaussian reaches are decoded; the others have the cosines of
+/// the code of zeros.
+pub(crate) struct BlendedCosines<'a> {
+    head: &'a CosineHead,
+    blended: &'a BlendedCodes,
+    directions: Directions,
+    /// Of the code of zeros, for each phrase.
+    of_nothing: Vec<f32>,
+}
+
+impl<'a> BlendedCosines<'a> {
+    pub(crate) fn new(head: &'a CosineHead, blended: &'a BlendedCodes, directions: Directions) -> Self {
+        let mut block = vec![0.0; directions.len() * BLOCK];
+        head.cosines(&vec![0.0; blended.planes.len() * BLOCK], &directions, &mut block);
+        let of_nothing = block.chunks_exact(BLOCK).map(|of_phrase| of_phrase[0]).collect();
+        Self { head, blended, directions, of_nothing }
+    }
+
+    /// Cosines of the code of zeros with each phrase.
+    pub(crate) fn of_nothing(&self) -> &[f32] {
+        &self.of_nothing
+    }
+}
+
+impl PieceCosines for BlendedCosines<'_> {
+    fn pixels(&self) -> usize {
+        self.blended.alpha.len()
+    }
+
+    fn phrases(&self) -> usize {
+        self.directions.len()
+    }
+
+    fn alpha(&self) -> Option<&[f32]> {
+        Some(&self.blended.alpha)
+    }
+
+    fn of_piece(&self, piece: usize, out: &mut [f32]) {
+        out.chunks_exact_mut(PIECE).zip(&self.of_nothing).for_each(|(plane, v)| plane.fill(*v));
+        let alpha = pieces::part(&self.blended.alpha, piece);
+        let reached: Vec<usize> = (0..alpha.len()).filter(|k| alpha[*k] != 0.0).collect();
+        let mut codes = vec![0.0; self.blended.planes.len() * BLOCK];
+        let mut found = vec![0.0; self.directions.len() * BLOCK];
+        for block in reached.chunks(BLOCK) {
+            for (codes, plane) in codes.chunks_exact_mut(BLOCK).zip(&self.blended.planes) {
+                let plane = pieces::part(plane, piece);
+                codes.iter_mut().zip(block).for_each(|(code, k)| *code = plane[*k]);
+            }
+            self.head.cosines(&codes, &self.directions, &mut found);
+            for (plane, found) in out.chunks_exact_mut(PIECE).zip(found.chunks_exact(BLOCK)) {
+                block.iter().zip(found).for_each(|(k, v)| plane[*k] = *v);
+            }
         }
-        let mut codes = vec![0.0; blended.planes.len() * BLOCK];
-        for (codes, plane) in codes.chunks_exact_mut(BLOCK).zip(&blended.planes) {
-            codes[..pixels.len()].copy_from_slice(&plane[pixels.clone()]);
-        }
-        let mut out = vec![0.0; directions.len() * BLOCK];
-        head.cosines(&codes, directions, &mut out);
-        out
-    };
-    let found: Vec<Vec<f32>> = (0..blocks).into_par_iter().with_min_len(8).map(one).collect();
-    let plane = |v: usize| {
-        let mut plane: Vec<f32> =
-            found.iter().flat_map(|out| out[v * BLOCK..(v + 1) * BLOCK].iter().copied()).collect();
-        plane.truncate(blended.alpha.len());
-        plane
-    };
-    (0..directions.len()).map(plane).collect()
+    }
 }
 
 /// Cosines of single Gaussians with phrases.

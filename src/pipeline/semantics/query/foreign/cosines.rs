@@ -9,7 +9,7 @@ use crate::math::vector::dot;
 /// Codes that are decoded together, side by side.
 pub(crate) const BLOCK: usize = 32;
 /// Squared length under which an embedding has no direction.
-const NO_LENGTH: f32 = 1e-20;
+pub(crate) const NO_LENGTH: f32 = 1e-20;
 
 /// Parts of a decoder that do not depend on phrases.
 #[derive(Clone, Debug)]
@@ -41,6 +41,11 @@ impl Directions {
     pub(crate) fn len(&self) -> usize {
         self.0.len()
     }
+
+    /// Weight of a hidden number; 0 for a phrase that there is not.
+    pub(crate) fn weight(&self, phrase: usize, hidden: usize) -> f32 {
+        self.0.get(phrase).map_or(0.0, |(weights, _)| weights[hidden])
+    }
 }
 
 impl CosineHead {
@@ -58,6 +63,11 @@ impl CosineHead {
     /// Returns whether codes are the embeddings themselves.
     pub(crate) fn is_plain(&self) -> bool {
         self.before.is_empty() && self.last.is_none()
+    }
+
+    /// Returns whether codes are weights of a codebook's entries: embeddings of any positive multiple have one direction.
+    pub(crate) fn is_codebook(&self) -> bool {
+        self.before.is_empty() && self.last.as_ref().is_some_and(|last| last.of_bias == 0.0)
     }
 
     /// Prepares embeddings of phrases, of unit length.
@@ -91,15 +101,20 @@ impl CosineHead {
                 DecoderStep::AddKept => hidden.iter_mut().zip(&kept).for_each(|(v, kept)| *v += kept),
             }
         }
-        let squares = match &self.last {
-            None => plain_squares(&hidden),
-            Some(last) => squares(last, &hidden),
-        };
+        let squares = self.squares(&hidden);
         for (out, (direction, offset)) in out.chunks_exact_mut(BLOCK).zip(&directions.0) {
             project(&hidden, direction, *offset, out);
             for (v, square) in out.iter_mut().zip(&squares) {
                 *v = if *square > NO_LENGTH { *v / square.sqrt() } else { 0.0 };
             }
+        }
+    }
+
+    /// Squared lengths of the embeddings of a block of last hidden numbers.
+    pub(crate) fn squares(&self, hidden: &[f32]) -> [f32; BLOCK] {
+        match &self.last {
+            None => plain_squares(hidden),
+            Some(last) => squares(last, hidden),
         }
     }
 }

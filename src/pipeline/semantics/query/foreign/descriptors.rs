@@ -2,6 +2,7 @@
 //! largest weighed relevancy answers a phrase.
 
 use crate::io::results::ClusterLevel;
+use crate::math::vector::unit;
 
 /// What the best embedding of a cluster answers, or those of a Gaussian's clusters.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -30,4 +31,13 @@ pub(crate) fn nearest(clusters: &ClusterLevel, cosines: &[f32]) -> Vec<f32> {
         counting.map(|(row, _)| cosines[row]).reduce(f32::max).unwrap_or(0.0)
     };
     (0..clusters.count()).map(of).collect()
+}
+
+/// The direction of a cluster: its embedding, or the weighed mean of several; `None` if it has none.
+pub(crate) fn direction(clusters: &ClusterLevel, k: usize) -> Option<Vec<f32>> {
+    let mut sum = vec![0.0; clusters.features.dim()];
+    for (row, weight) in clusters.weighted(k) {
+        sum.iter_mut().zip(clusters.features.row(row)).for_each(|(sum, v)| *sum += weight * v);
+    }
+    unit(&sum)
 }

@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use super::descriptors::direction;
 use super::{ForeignError, affinity, classes};
 use crate::io::results::{ClusterLevel, LevelValues, MethodResult};
 use crate::math::vector::unit;
@@ -27,7 +28,9 @@ pub fn semantic_map(result: &MethodResult, scale: f32) -> Result<SemanticMap, Fo
             let found = classes::of_gaussians(classifier, features);
             // Class 0 is nothing.
             let of: Vec<Option<u32>> = found.iter().map(|f| (f.class > 0).then_some(f.class)).collect();
-            let mut numbered = Numbered::new(&of, |class| vec![format!("class {class}")]);
+            let own = |class| classifier.names.get(&class).cloned();
+            let mut numbered =
+                Numbered::new(&of, |class| own(class).into_iter().chain([format!("class {class}")]).collect());
             numbered.margin = found.iter().map(|f| f.margin).collect();
             Ok(numbered.map(&result.cloud, None))
         }
@@ -99,7 +102,7 @@ impl Known<'_> {
 }
 
 fn known<'a>(result: &'a MethodResult, clusters: &ClusterLevel) -> Known<'a> {
-    let encoder = result.method.encoder().unwrap_or_default();
+    let encoder = result.encoder.as_deref().unwrap_or_default();
     Known { encoder, dimension: clusters.features.dim(), by_identity: Vec::new() }
 }
 
@@ -107,15 +110,6 @@ fn known<'a>(result: &'a MethodResult, clusters: &ClusterLevel) -> Known<'a> {
 fn units(clusters: &ClusterLevel, k: u32) -> Vec<Vec<f32>> {
     let counting = clusters.weighted(k as usize).filter(|(_, weight)| *weight > 0.0);
     counting.filter_map(|(row, _)| unit(&clusters.features.row(row))).collect()
-}
-
-/// The direction of a cluster: its embedding, or the weighed mean of several.
-fn direction(clusters: &ClusterLevel, k: u32) -> Option<Vec<f32>> {
-    let mut sum = vec![0.0; clusters.features.dim()];
-    for (row, weight) in clusters.weighted(k as usize) {
-        sum.iter_mut().zip(clusters.features.row(row)).for_each(|(sum, v)| *sum += weight * v);
-    }
-    unit(&sum)
 }
 
 /// Clusters of one level, as objects.
@@ -152,7 +146,7 @@ fn nested(result: &MethodResult, wholes: &ClusterLevel, parts: &ClusterLevel) ->
             continue;
         }
         let id = numbered.identities.add(Level::Part, numbered.known[whole], Vec::new());
-        known.add(units(parts, *part), direction(wholes, *whole).as_deref());
+        known.add(units(parts, *part), direction(wholes, *whole as usize).as_deref());
         ids.insert(*part, (*whole, id));
     }
     for (i, (whole, part)) in wholes.of.iter().zip(&parts.of).enumerate() {

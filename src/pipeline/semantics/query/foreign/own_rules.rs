@@ -5,7 +5,7 @@ use super::blend::{self, BlendSource};
 use super::{ForeignError, ForeignPhrase};
 use crate::io::results::{ClusterLevel, LevelValues, Method, ResultLevel};
 use crate::pipeline::semantics::smoothing::{
-    BY_COMMON_RULE, BY_SMOOTHING, LeveledMask, by_common_rule, by_smoothing, peak,
+    BY_COMMON_RULE, BY_SMOOTHING, LeveledMask, by_common_rule, by_smoothing_filled, peak,
 };
 use crate::render::{Features, RenderSettings, Renderer};
 use crate::scene::Mask;
@@ -44,12 +44,13 @@ impl ForeignMask {
 }
 
 impl ForeignScene {
-    /// The mask by the method's own rule.
+    /// The mask by the method's own rule, from the relevancy of all levels ([`Self::relevancy`]).
     pub fn own_mask(
         &self,
         renderer: &mut Renderer,
         view: &ForeignView,
         phrase: ForeignPhrase<'_>,
+        relevancy: &[Vec<f32>],
     ) -> Result<ForeignMask, ForeignError> {
         let (w, h) = view.size();
         let method = self.result.method;
@@ -57,21 +58,30 @@ impl ForeignScene {
             let mask = Mask::from_fn(w, h, |i| inside(values[i]));
             ForeignMask { mask, level: 0, peak: peak(&values), values, rule }
         };
+        let filled = |mut relevancy: Vec<f32>, phrase| {
+            let of_nothing = self.of_nothing(view, 0, phrase);
+            relevancy.iter_mut().filter(|r| **r == 0.0).for_each(|r| *r = of_nothing);
+            relevancy
+        };
         let covered = |(mask, values), level, rule| ForeignMask { mask, level, values, peak: None, rule };
         match method {
             Method::LangSplat | Method::LangSplatV2 | Method::OccamsLgs | Method::Gags => {
-                let each = |level| self.relevancy_of_method(renderer, view, level, phrase);
-                let levels = self.of_levels(each)?;
-                ForeignMask::of_level(by_smoothing(&levels, w, h), BY_SMOOTHING)
+                let of_nothing: Vec<f32> =
+                    (0..relevancy.len()).map(|level| self.of_nothing(view, level, phrase)).collect();
+                ForeignMask::of_level(by_smoothing_filled(relevancy, &of_nothing, w, h), BY_SMOOTHING)
             }
             Method::LeGaussians => {
                 let phrase = ForeignPhrase { temperature: LEGAUSSIANS_TEMPERATURE, ..phrase };
-                let relevancy = self.relevancy_of_method(renderer, view, 0, phrase)?;
-                Ok(threshold(relevancy, |r| r >= 0.5, "relevancy of 0.5 or more"))
+                let relevancy = self.pixel_relevancy(renderer, view, 0, phrase)?;
+                Ok(threshold(filled(relevancy, phrase), |r| r >= 0.5, "relevancy of 0.5 or more"))
             }
             Method::Feature3dgs => {
-                let relevancy = self.relevancy_of_method(renderer, view, 0, phrase)?;
-                Ok(threshold(relevancy, |r| r > 0.5, "more alike to the phrase than to any canonical phrase"))
+                let relevancy = relevancy.first().cloned().ok_or(ForeignError::Level(0))?;
+                Ok(threshold(
+                    filled(relevancy, phrase),
+                    |r| r > 0.5,
+                    "more alike to the phrase than to any canonical phrase",
+                ))
             }
             Method::OpenGaussian => {
                 let of = self.result.levels.first().ok_or(ForeignError::Level(0))?;
@@ -101,34 +111,11 @@ impl ForeignScene {
                             membership over 0.5";
                 Ok(covered(found, 0, rule))
             }
-            Method::GaussianGrouping | Method::OmniSeg3d | Method::Saga | Method::SemanticGaussiansOpenSeg => {
-                Err(ForeignError::of_silent(method))
-            }
-            Method::SplatDistiller | Method::Ludvig | Method::SemanticGaussians => {
+            Method::GaussianGrouping | Method::OmniSeg3d | Method::Saga => Err(ForeignError::of_silent(method)),
+            Method::SplatDistiller | Method::Ludvig | Method::SemanticGaussians | Method::SemanticGaussiansOpenSeg => {
                 Err(ForeignError::NoRule(method.name()))
             }
         }
-    }
-
-    /// The mask by this program's rule, the same for all methods: over a fifth of LERF's scale, at the level of the
-    /// largest relevancy.
-    pub fn fair_mask(
-        &self,
-        renderer: &mut Renderer,
-        view: &ForeignView,
-        phrase: ForeignPhrase<'_>,
-    ) -> Result<ForeignMask, ForeignError> {
-        let (w, h) = view.size();
-        let levels = self.of_levels(|level| self.pixel_relevancy(renderer, view, level, phrase))?;
-        ForeignMask::of_level(by_common_rule(&levels, w, h), BY_COMMON_RULE)
-    }
-
-    /// Relevancies of all levels, in order.
-    fn of_levels(
-        &self,
-        each: impl FnMut(usize) -> Result<Vec<f32>, ForeignError>,
-    ) -> Result<Vec<Vec<f32>>, ForeignError> {
-        (0..self.result.levels.len()).map(each).collect()
     }
 
     /// Pixels of which these Gaussians make more than a half, and how much they do.
@@ -163,6 +150,13 @@ impl ForeignScene {
         let is_in = |i: usize| all.iter().any(|(_, level, k)| clusters[*level].of[i] == Some(*k));
         (0..self.result.cloud.len()).map(is_in).collect()
     }
+}
+
+/// The mask by this program's rule, the same for all methods: over a fifth of LERF's scale, at the level of the largest
+/// relevancy of the phrase.
+pub fn fair_mask(view: &ForeignView, relevancy: &[Vec<f32>]) -> Result<ForeignMask, ForeignError> {
+    let (w, h) = view.size();
+    ForeignMask::of_level(by_common_rule(relevancy, w, h), BY_COMMON_RULE)
 }
 
 /// OpenGaussian's clusters of an answer: the best one, and of the ten best those near it that have a larger number in

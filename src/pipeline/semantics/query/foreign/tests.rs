@@ -3,59 +3,60 @@
 use std::sync::Arc;
 
 use super::asked::{ForeignScene, ForeignView};
-use super::blend::BlendedCodes;
+use super::blend::{BlendedCodes, blend_level};
 use super::click::ClickedFeature;
+use super::own_rules::{ForeignMask, fair_mask};
+use super::pointed::PointedPixel;
 use super::*;
-use crate::io::results::tests::{expected, sample};
-use crate::io::results::{LevelValues, MethodResult};
+use crate::io::results::tests::{expected, sample, with_class_names};
+use crate::io::results::{LevelValues, MethodResult, ResultOptions, open_result};
 use crate::render::Renderer;
-use crate::scene::{Level, NO_IDENTITY};
 
 /// Largest difference from the reference.
-const TOLERANCE: f32 = 1e-4;
+pub(super) const TOLERANCE: f32 = 1e-4;
 
 /// Largest difference of numbers.
-fn apart(a: &[f32], b: &[f32]) -> f32 {
+pub(super) fn apart(a: &[f32], b: &[f32]) -> f32 {
     assert_eq!(a.len(), b.len());
     a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max)
 }
 
 /// The phrase of the samples, and its canonicals.
-struct Texts(Vec<Vec<f32>>);
+pub(super) struct Texts(Vec<Vec<f32>>);
 
 impl Texts {
     fn of(path: &str, dim: usize) -> Self {
         Self(expected(path).chunks_exact(dim).map(<[f32]>::to_vec).collect())
     }
 
-    fn new() -> Self {
+    pub(super) fn new() -> Self {
         Self::of("scene/texts.npy", 512)
     }
 
-    fn phrase(&self) -> ForeignPhrase<'_> {
+    pub(super) fn phrase(&self) -> ForeignPhrase<'_> {
         ForeignPhrase { query: &self.0[0], canonical: &self.0[1..], temperature: 10.0 }
     }
 
-    fn all(&self) -> Vec<&[f32]> {
+    pub(super) fn all(&self) -> Vec<&[f32]> {
         self.0.iter().map(Vec::as_slice).collect()
     }
 }
 
 /// A sample with a view of its first camera.
-struct Seen {
-    scene: ForeignScene,
-    view: ForeignView,
+pub(super) struct Seen {
+    pub(super) scene: ForeignScene,
+    pub(super) view: ForeignView,
     renderer: Renderer,
 }
 
 impl Seen {
-    fn new(path: &str) -> Self {
+    pub(super) fn new(path: &str) -> Self {
         // LUDVIG and splat-distiller leave no cameras: those of another sample are the same.
         let camera = sample("gaussian_grouping").cameras[0].camera.clone();
         Self::of(sample(path), &camera)
     }
 
-    fn of(result: MethodResult, camera: &crate::scene::Camera) -> Self {
+    pub(super) fn of(result: MethodResult, camera: &crate::scene::Camera) -> Self {
         let scene = ForeignScene::new(Arc::new(result));
         let mut renderer = Renderer::new();
         let view = scene.look(&mut renderer, camera).expect("drawn");
@@ -65,15 +66,29 @@ impl Seen {
     fn relevancy(&mut self, level: usize, phrase: ForeignPhrase<'_>) -> Vec<f32> {
         self.scene.pixel_relevancy(&mut self.renderer, &self.view, level, phrase).expect("answered")
     }
+
+    /// The masks by the method's own rule and by the common one.
+    pub(super) fn masks(&mut self, phrase: ForeignPhrase<'_>) -> (Result<ForeignMask, ForeignError>, ForeignMask) {
+        let found = self.scene.relevancy(&mut self.renderer, &self.view, phrase).expect("answered");
+        let own = self.scene.own_mask(&mut self.renderer, &self.view, phrase, &found);
+        (own, fair_mask(&self.view, &found).expect("a level"))
+    }
+
+    /// Blended numbers of a level, drawn anew.
+    fn blend(&mut self, level: usize) -> BlendedCodes {
+        let of = &self.scene.result.levels[level];
+        let LevelValues::Embedded(embedded) = &of.values else { panic!("no embeddings") };
+        blend_level(&mut self.renderer, &of.cloud, embedded, &self.view.camera).expect("drawn")
+    }
 }
 
 /// Blended numbers, pixel after pixel.
-fn interleaved(blended: &BlendedCodes) -> Vec<f32> {
+pub(super) fn interleaved(blended: &BlendedCodes) -> Vec<f32> {
     (0..blended.alpha.len()).flat_map(|i| blended.planes.iter().map(move |plane| plane[i])).collect()
 }
 
 /// Compares relevancy of Gaussians and pixels of a level with the reference; returns the largest difference.
-fn relevancy_apart(seen: &mut Seen, level: usize, folder: &str, suffix: &str, texts: &Texts) -> f32 {
+pub(super) fn relevancy_apart(seen: &mut Seen, level: usize, folder: &str, suffix: &str, texts: &Texts) -> f32 {
     let gaussians = seen.scene.gaussian_relevancy(level, texts.phrase()).expect("answered");
     let pixels = seen.relevancy(level, texts.phrase());
     let of = |name: &str| expected(&format!("{folder}/expected/relevancy_{name}{suffix}.npy"));
@@ -88,7 +103,7 @@ fn levels_of_langsplat_answer_like_the_reference() {
     {
         let mut seen = Seen::new(place);
         for level in 0..3 {
-            let blended = interleaved(seen.view.blended(level).expect("blended"));
+            let blended = interleaved(&seen.blend(level));
             let wanted = expected(&format!("{folder}/expected/{codes}_pixels_{}.npy", level + 1));
             assert!(apart(&blended, &wanted) < TOLERANCE, "{folder} {level}");
             let difference = relevancy_apart(&mut seen, level, folder, &format!("_{}", level + 1), &texts);
@@ -96,6 +111,34 @@ fn levels_of_langsplat_answer_like_the_reference() {
             let other = relevancy_apart(&mut seen, level, folder, &format!("_{}", (level + 1) % 3 + 1), &texts);
             assert!(other > 10.0 * TOLERANCE, "the control, a level exchanged: {other}");
         }
+    }
+}
+
+#[test]
+fn packed_weights_answer_like_the_blended_ones_of_the_sample() {
+    use super::asked::LevelView;
+    use super::blend::BlendedCosines;
+    use super::cosines::CosineHead;
+    use super::packed::PackedWeights;
+    use super::pieces::relevancy;
+    let texts = Texts::new();
+    let mut seen = Seen::new("langsplat_v2/output");
+    for level in 0..3 {
+        assert!(matches!(seen.view.levels[level], LevelView::Packed(_)));
+        let mut blended = seen.blend(level);
+        let LevelValues::Embedded(embedded) = &seen.scene.result.levels[level].values else { panic!("no embeddings") };
+        let head = CosineHead::new(&embedded.decoder);
+        let directions = head.directions(&texts.all());
+        let plain = relevancy(&BlendedCosines::new(&head, &blended, directions.clone()), 10.0);
+        let found =
+            seen.scene.pixel_relevancy(&mut seen.renderer, &seen.view, level, texts.phrase()).expect("answered");
+        let difference = apart(&found, &plain);
+        assert!(difference < 2e-5, "{level}: {difference}");
+        blended.planes.rotate_left(1);
+        let turned = PackedWeights::new(&head, &blended);
+        let turned = relevancy(&turned.compared(&directions), 10.0);
+        let difference = apart(&turned, &plain);
+        assert!(difference > 10.0 * TOLERANCE, "the control, entries exchanged: {difference}");
     }
 }
 
@@ -114,18 +157,6 @@ fn a_layer_exchanged_or_a_codebook_turned_is_noticed() {
     level.decoder = Decoder::new(3, steps, path).expect("fits");
     let camera = result.cameras[0].camera.clone();
     let difference = relevancy_apart(&mut Seen::of(result, &camera), 0, "langsplat", "_1", &texts);
-    assert!(difference > 10.0 * TOLERANCE, "{difference}");
-    // GAGS's decoder without what skips its layers.
-    let blended = interleaved(Seen::new("gags").view.blended(0).expect("blended"));
-    assert!(apart(&blended, &expected("gags/expected/codes_pixels.npy")) < TOLERANCE);
-    let mut result = sample("gags");
-    let LevelValues::Embedded(level) = &mut result.levels[0].values else { panic!("no embeddings") };
-    let (before, last) = level.decoder.split();
-    let mut steps = before.to_vec();
-    steps.retain(|step| !matches!(step, DecoderStep::Keep | DecoderStep::AddKept));
-    steps.push(DecoderStep::Linear(last.expect("a layer").clone()));
-    level.decoder = Decoder::new(16, steps, path).expect("fits");
-    let difference = relevancy_apart(&mut Seen::of(result, &camera), 0, "gags", "", &texts);
     assert!(difference > 10.0 * TOLERANCE, "{difference}");
     // LangSplatV2's codebook is read column by column.
     let mut result = sample("langsplat_v2/output");
@@ -215,6 +246,32 @@ fn classes_of_gaussian_grouping_are_those_of_its_classifier() {
 }
 
 #[test]
+fn a_name_of_a_class_is_answered_by_the_class() {
+    let folder = tempfile::tempdir().expect("folder");
+    let path = with_class_names(folder.path(), "7 kettle\n3 mug\n");
+    let result = open_result(&path, &ResultOptions::default()).expect("opens");
+    let camera = result.cameras[0].camera.clone();
+    let seen = Seen::of(result, &camera);
+    assert!(seen.scene.has_named_classes() && !Seen::new("gaussian_grouping").scene.has_named_classes());
+    let alpha = &seen.view.blended(0).expect("blended").alpha;
+    let mut wanted = expected("gaussian_grouping/expected/probability_of_class_7_pixels.npy");
+    wanted.iter_mut().zip(alpha).filter(|(_, a)| **a == 0.0).for_each(|(w, _)| *w = 0.0);
+    let share = |name: &str| seen.scene.share_of_name(&seen.view, name);
+    assert!(apart(&share("the kettle").expect("a class"), &wanted) < TOLERANCE);
+    assert!(apart(&share("mug").expect("a class"), &wanted) > 0.1, "the control: another class");
+    let mask = seen.scene.mask_of_name(&seen.view, "kettle").expect("a class");
+    // A share within the tolerance of the threshold may fall on either side.
+    let sure = |w: f32| (w - 0.2).abs() > TOLERANCE;
+    assert!((0..wanted.len()).filter(|i| sure(wanted[*i])).all(|i| mask.mask.contains(i) == (wanted[i] > 0.2)));
+    assert!(mask.peak.is_some_and(|at| mask.mask.contains(at)));
+    let e = share("lid").expect_err("no class").to_string();
+    assert!(e.contains("'lid'") && e.contains("class_names.txt"), "{e}");
+    let map = identities::semantic_map(&seen.scene.result, identities::USUAL_SCALE).expect("classes");
+    let names: Vec<String> = map.identities.iter().map(|(id, _)| map.identities.name(id)).collect();
+    assert_eq!(names, ["mug", "kettle", "class 200"]);
+}
+
+#[test]
 fn a_click_in_saga_scores_like_the_reference() {
     let seen = Seen::new("saga");
     let LevelValues::Affinity { features, gate } = &seen.scene.result.levels[0].values else { panic!("no affinities") };
@@ -233,75 +290,51 @@ fn a_click_in_saga_scores_like_the_reference() {
 }
 
 #[test]
+fn a_pixel_tells_what_it_belongs_to() {
+    let pixel = |at, scale| PointedPixel { at, scale, threshold: 0.9 };
+    // SAGA: what scores like the pixel.
+    let saga = Seen::new("saga");
+    let mask = |scale| saga.scene.pointed(&saga.view, pixel([7, 6], scale)).expect("affinities").expect("something");
+    let found = mask(0.5);
+    assert!(found.mask.contains(6 * 24 + 7) && found.values[6 * 24 + 7] > 1.0 - TOLERANCE);
+    assert!((0..found.values.len()).all(|i| found.mask.contains(i) == (found.values[i] >= 0.9)));
+    assert_ne!(found.values, mask(1.0).values, "the control: another scale");
+    assert_eq!(saga.scene.pointed(&saga.view, pixel([24, 0], 0.5)).expect("affinities"), None, "outside of the view");
+    // Gaussian Grouping: the pixels of its class.
+    let grouping = Seen::new("gaussian_grouping");
+    let classes = expected("gaussian_grouping/expected/classes_pixels.npy");
+    let i = classes.iter().position(|c| *c == 7.0).expect("seen");
+    let found = grouping.scene.pointed(&grouping.view, pixel([i % 24, i / 24], 0.5)).expect("classes").expect("one");
+    assert!((0..classes.len()).all(|k| found.mask.contains(k) == (classes[k] == 7.0)));
+    let nothing = classes.iter().position(|c| *c == 0.0).expect("background");
+    assert_eq!(
+        grouping.scene.pointed(&grouping.view, pixel([nothing % 24, nothing / 24], 0.5)).expect("classes"),
+        None
+    );
+    // THGS: levels by scale; embeddings alone tell nothing.
+    let thgs = Seen::new("thgs");
+    let at = |scale| thgs.scene.pointed(&thgs.view, pixel([12, 9], scale)).expect("clusters").map(|f| f.level);
+    assert_eq!([at(0.0), at(1.0)], [Some(0), Some(2)]);
+    let embeddings = Seen::new("langsplat/output");
+    let none = embeddings.scene.pointed(&embeddings.view, pixel([12, 9], 0.5));
+    assert!(matches!(none, Err(ForeignError::NoIdentities("LangSplat"))));
+}
+
+#[test]
 fn clusters_of_open_gaussian_answer_like_the_reference() {
     let texts = Texts::new();
     let mut seen = Seen::new("opengaussian");
     let LevelValues::Clusters(clusters) = &seen.scene.result.levels[0].values else { panic!("no clusters") };
     let relevancy = seen.scene.cluster_relevancy(clusters, texts.phrase()).expect("answered");
     assert!(apart(&relevancy, &expected("opengaussian/expected/relevancy_leaves.npy")) < TOLERANCE);
-    let own = seen.scene.own_mask(&mut seen.renderer, &seen.view, texts.phrase()).expect("answered");
+    let (own, fair) = seen.masks(texts.phrase());
+    let own = own.expect("a rule");
     let wanted = expected("opengaussian/expected/silhouette_pixels.npy");
     let inside: Vec<usize> = (0..wanted.len()).filter(|i| wanted[*i] > 0.7).collect();
     assert_eq!(own.mask.pixels().collect::<Vec<_>>(), inside);
     assert!(!inside.is_empty());
     // The best cluster alone covers less.
-    let fair = seen.scene.fair_mask(&mut seen.renderer, &seen.view, texts.phrase()).expect("answered");
     assert!(!fair.mask.is_empty() && fair.rule != own.rule);
-}
-
-#[test]
-fn descriptors_of_laga_answer_like_the_reference() {
-    let texts = Texts::new();
-    let mut seen = Seen::new("laga");
-    let at = |name: &str| expected(&format!("laga/expected/{name}.npy"));
-    for level in 0..3 {
-        let found = seen.scene.gaussian_relevancy(level, texts.phrase()).expect("answered");
-        let of = |level: usize| at(&format!("relevancy_gaussians_{}", level + 1));
-        assert!(apart(&found, &of(level)) < TOLERANCE, "{level}");
-        assert!(apart(&found, &of((level + 1) % 3)) > 10.0 * TOLERANCE, "the control: another level");
-    }
-    let parts = |scene: &ForeignScene| -> (Vec<f32>, Vec<f32>) {
-        let answers = scene.descriptor_answers(texts.phrase()).expect("answered");
-        answers.into_iter().map(|answer| (answer.relevancy, answer.cosine)).unzip()
-    };
-    let (relevancy, cosines) = parts(&seen.scene);
-    assert!(apart(&relevancy, &at("relevancy_gaussians")) < TOLERANCE);
-    assert!(apart(&cosines, &at("cosine_gaussians")) < TOLERANCE);
-    let chosen = seen.scene.chosen_by_descriptors(texts.phrase()).expect("answered");
-    let chosen: Vec<f32> = chosen.into_iter().map(|chosen| f32::from(u8::from(chosen))).collect();
-    assert_eq!(chosen, at("chosen_gaussians"));
-    let own = seen.scene.own_mask(&mut seen.renderer, &seen.view, texts.phrase()).expect("answered");
-    let membership = at("membership_pixels");
-    assert!(apart(&own.values, &membership) < TOLERANCE);
-    let inside: Vec<usize> = (0..membership.len()).filter(|i| membership[*i] > 0.5).collect();
-    assert_eq!(own.mask.pixels().collect::<Vec<_>>(), inside);
-    assert!(!inside.is_empty());
-    // The weights of a level in another order.
-    let mut result = sample("laga");
-    let LevelValues::Clusters(clusters) = &mut result.levels[0].values else { panic!("no clusters") };
-    clusters.several.as_mut().expect("several").weights.reverse();
-    let (turned, _) = parts(&ForeignScene::new(Arc::new(result)));
-    assert!(apart(&turned, &at("relevancy_gaussians")) > 10.0 * TOLERANCE, "the control: weights exchanged");
-}
-
-#[test]
-fn rows_of_semantic_gaussians_that_are_exchanged_are_noticed() {
-    use crate::io::results::{FeatureRows, LevelCodes};
-    let (texts, mut result) = (Texts::new(), sample("semantic_gaussians"));
-    let camera = result.cameras[0].camera.clone();
-    let seen = Seen::of(sample("semantic_gaussians"), &camera);
-    let found = seen.scene.gaussian_cosines(0, &texts.all()).expect("answered");
-    let rows: Vec<f32> = (0..32).flat_map(|i| found.iter().map(move |of| of[i]).collect::<Vec<_>>()).collect();
-    assert!(apart(&rows, &expected("semantic_gaussians/expected/cosines_gaussians.npy")) < TOLERANCE);
-    let none = seen.scene.own_mask(&mut Renderer::new(), &seen.view, texts.phrase());
-    assert!(matches!(none, Err(ForeignError::NoRule("Semantic Gaussians"))));
-    // Each Gaussian gets the row of the one before.
-    let LevelValues::Embedded(level) = &mut result.levels[0].values else { panic!("no embeddings") };
-    let LevelCodes::Dense(codes) = &level.codes else { panic!("no rows") };
-    let turned = (0..32).flat_map(|i| codes.row((i + 31) % 32)).collect();
-    level.codes = LevelCodes::Dense(FeatureRows::new(512, turned).expect("whole rows"));
-    let difference = relevancy_apart(&mut Seen::of(result, &camera), 0, "semantic_gaussians", "", &texts);
-    assert!(difference > 10.0 * TOLERANCE, "{difference}");
 }
 
 #[test]
@@ -320,8 +353,7 @@ fn segments_of_thgs_answer_like_the_reference() {
     };
     assert_eq!(members(1..3), wanted);
     assert_ne!(members(2..3), wanted, "the control: the coarse level alone");
-    let own = seen.scene.own_mask(&mut seen.renderer, &seen.view, texts.phrase()).expect("answered");
-    assert!(!own.mask.is_empty());
+    assert!(!seen.masks(texts.phrase()).0.expect("a rule").mask.is_empty());
 }
 
 #[test]
@@ -337,51 +369,16 @@ fn every_language_has_a_mask_by_its_own_rule_and_by_the_common_one() {
         "laga",
     ] {
         let mut seen = Seen::new(place);
-        let own = seen.scene.own_mask(&mut seen.renderer, &seen.view, texts.phrase()).expect(place);
-        let fair = seen.scene.fair_mask(&mut seen.renderer, &seen.view, texts.phrase()).expect(place);
+        let (own, fair) = seen.masks(texts.phrase());
+        let own = own.expect(place);
         assert!(!fair.mask.is_empty() && fair.rule != own.rule, "{place}");
         // In a picture of this size, what LangSplat finds is a speck, which its rule takes away.
         assert_eq!(own.mask.is_empty(), place == "langsplat/output", "{place}");
     }
     let mut seen = Seen::new("ludvig");
-    let none = seen.scene.own_mask(&mut seen.renderer, &seen.view, texts.phrase());
+    let (none, _) = seen.masks(texts.phrase());
     assert!(matches!(none, Err(ForeignError::NoRule("LUDVIG"))));
     let short = ForeignPhrase { query: &[1.0; 24], canonical: &[], temperature: 10.0 };
     let e = seen.scene.gaussian_relevancy(0, short).expect_err("another length").to_string();
     assert!(e.contains("24") && e.contains("512") && e.contains("clip-vit-b16"), "{e}");
-}
-
-#[test]
-fn classes_and_clusters_become_a_semantic_map() {
-    let map = |path: &str| identities::semantic_map(&sample(path), identities::USUAL_SCALE);
-    let grouping = map("gaussian_grouping").expect("classes");
-    // Classes 7, 3 and 200; class 0 is nothing.
-    let names: Vec<String> = grouping.identities.iter().map(|(id, _)| grouping.identities.name(id)).collect();
-    assert_eq!(names, ["class 3", "class 7", "class 200"]);
-    let wanted = expected("gaussian_grouping/expected/classes_gaussians.npy");
-    for (id, class) in grouping.identity_of.iter().zip(&wanted) {
-        let name = if *class == 0.0 { "nothing".to_owned() } else { format!("class {class}") };
-        assert_eq!(grouping.identities.name(*id), name);
-    }
-    assert!(grouping.margin.iter().all(|m| (0.0..=1.0).contains(m)) && grouping.language.is_none());
-    let clusters = map("opengaussian").expect("clusters");
-    let language = clusters.language.as_ref().expect("embeddings");
-    assert!(language.is_valid(&clusters.identities) && language.encoder == "clip-vit-b16");
-    assert!(language.by_identity[0].raw.is_empty(), "seen three times");
-    assert_eq!(clusters.identities.len(), 12);
-    let thgs = map("thgs").expect("clusters");
-    assert_eq!((thgs.identities.count(Level::Object), thgs.identities.count(Level::Part)), (4, 8));
-    assert!(thgs.language.as_ref().is_some_and(|l| l.is_valid(&thgs.identities)));
-    assert_eq!(thgs.identity_of[9], NO_IDENTITY);
-    assert!(thgs.identities.iter().filter(|(_, i)| i.level == Level::Part).all(|(_, i)| i.parent != NO_IDENTITY));
-    let laga = map("laga").expect("clusters");
-    // Each half of its two large clusters is a part.
-    assert_eq!((laga.identities.count(Level::Object), laga.identities.count(Level::Part)), (2, 4));
-    let language = laga.language.as_ref().expect("embeddings");
-    assert!(language.is_valid(&laga.identities));
-    let counts: Vec<usize> = language.by_identity.iter().map(|of| of.raw.len()).collect();
-    assert_eq!(counts, [1, 2, 1, 2, 1, 2], "embeddings without a weight are none");
-    let saga = map("saga").expect("objects");
-    assert_eq!(saga.identity_of.len(), 32);
-    assert!(matches!(map("langsplat/output"), Err(ForeignError::NoIdentities("LangSplat"))));
 }

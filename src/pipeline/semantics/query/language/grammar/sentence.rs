@@ -205,8 +205,29 @@ impl<'a> SentenceReader<'a> {
         }
     }
 
+    /// Reads "is the mug or the bottle wider": the choices, then the order that decides.
+    fn which_of(&mut self) {
+        let (tokens, n) = (self.whole.tokens.clone(), self.whole.tokens.len());
+        let is_choice = |e: &Expression| matches!(e.set, SetOf::Union { either: true, .. });
+        let or = self.whole.words.iter().position(|w| *w == "or").unwrap_or(n);
+        for at in (or + 2..n).rev() {
+            let choices = self.whole.of(tokens[1..at].to_vec()).all();
+            for of in choices.iter().filter(|e| is_choice(e)).take(2) {
+                self.said_of(of, tokens[at..].to_vec());
+            }
+            self.found.retain(|s| matches!(&s.set.set, SetOf::Ranked { of, .. } if is_choice(of)));
+            if !self.found.is_empty() {
+                return;
+            }
+        }
+    }
+
     /// Reads "is the mug left of the kettle": any division into a thing and what is said of it.
     fn so(&mut self) {
+        self.which_of();
+        if !self.found.is_empty() {
+            return;
+        }
         let is = self.whole.tokens[0];
         let n = self.whole.tokens.len();
         for at in 2..n {

@@ -1,9 +1,10 @@
-//! Results whose neighbor files are missing, or are those of another run.
+//! Results whose files are missing, broken, or those of another run.
 
 use std::path::PathBuf;
 
 use super::tests::{codes, copied, refused, sample, samples};
 use super::*;
+use crate::io::IoError;
 use crate::io::torch::written::{Saved, saved};
 
 #[test]
@@ -112,6 +113,8 @@ fn features_of_semantic_gaussians_belong_to_the_marked_ones() {
     assert_eq!((open_seg.method, rows(&open_seg).len()), (Method::SemanticGaussiansOpenSeg, 32 * 768));
     assert_eq!(sniff(&file).map(|found| found.method), Some(Method::SemanticGaussiansOpenSeg));
     assert!(open_seg.method.encoder().is_none() && open_seg.method.missing_encoder().is_some());
+    let named = ResultOptions { encoder: Some("own-clip".into()), ..ResultOptions::default() };
+    assert_eq!(open_result(&file, &named).expect("opens").encoder.as_deref(), Some("own-clip"));
     write(fused(100, &[3, 30]));
     assert!(refused(&file).contains("512 (LSeg) or 768 (OpenSeg)"), "{}", refused(&file));
     // The Gaussians of another run, and none.
@@ -144,4 +147,52 @@ fn features_of_splat_distiller_need_their_checkpoint() {
     std::fs::remove_file(run.join("ckpts/ckpt_29999_rank0.pt")).expect("removed");
     let e = refused(&run);
     assert!(e.contains("checkpoint was not found") && e.contains("beside the features"), "{e}");
+}
+
+#[test]
+fn cut_files_are_errors_wherever_they_end() {
+    let folder = tempfile::tempdir().expect("folder");
+    for (sample, file) in [
+        ("dr_splat", "pq_index.faiss"),
+        ("opengaussian", "cluster_lang.npz"),
+        ("thgs", "sai_nag.pt"),
+        ("langsplat_v2", "output/made_up_0_2/chkpnt10000.pth"),
+        ("saga", "point_cloud/iteration_10000/contrastive_feature_point_cloud.ply"),
+        ("ludvig", "features.npy"),
+        ("splat_distiller", "ckpts/ckpt_29999_rank0_features.pt"),
+        ("gags", "decoder_chkpnt30000.pth"),
+        ("laga", "point_cloud/iteration_30000/multi_lvl_seg_scores.pth"),
+        ("semantic_gaussians", "fusion/0.pt"),
+    ] {
+        let to = folder.path().join(sample);
+        copied(&samples().join(sample), &to);
+        let whole = std::fs::read(to.join(file)).expect("read");
+        let at = if sample == "langsplat_v2" { to.join("output") } else { to.clone() };
+        assert!(open_result(&at, &ResultOptions::default()).is_ok(), "{sample}");
+        // The end of the index, lists of vectors, is not needed.
+        let needed = if sample == "dr_splat" { whole.len() - 32 } else { whole.len() };
+        for k in 0..24 {
+            std::fs::write(to.join(file), &whole[..(needed - 1) * k / 23]).expect("written");
+            let result = open_result(&at, &ResultOptions::default());
+            assert!(result.is_err(), "{sample} cut at {k} of 23");
+        }
+    }
+}
+
+#[test]
+fn changed_bytes_of_an_index_are_errors_or_other_numbers() {
+    let folder = tempfile::tempdir().expect("folder");
+    copied(&samples().join("dr_splat"), folder.path());
+    let file = folder.path().join("pq_index.faiss");
+    let whole = std::fs::read(&file).expect("read");
+    let mut refused = 0;
+    for at in 0..200 {
+        let mut bytes = whole.clone();
+        bytes[at] ^= 0x80;
+        std::fs::write(&file, bytes).expect("written");
+        refused += usize::from(open_result(folder.path(), &ResultOptions::default()).is_err());
+    }
+    assert!(refused > 30, "{refused}");
+    let missing = IoError::syntax(&file, "index", "x").to_string();
+    assert!(missing.contains("pq_index.faiss"));
 }
