@@ -37,13 +37,18 @@ pub(crate) struct CompareQuestion {
     pub(crate) scenes: Vec<Versioned<AskedScene>>,
     pub(crate) camera: Camera,
     pub(crate) asks: AskedOfAll,
+    /// Encoder of phrases for results, in place of their authors'.
+    pub(crate) encoder: Option<String>,
 }
 
 impl CompareQuestion {
     /// Returns whether both have the same answers.
     pub(crate) fn is_same(&self, other: &Self) -> bool {
         let generations = |q: &Self| q.scenes.iter().map(Versioned::generation).collect::<Vec<_>>();
-        self.asks == other.asks && self.camera == other.camera && generations(self) == generations(other)
+        self.asks == other.asks
+            && self.encoder == other.encoder
+            && self.camera == other.camera
+            && generations(self) == generations(other)
     }
 }
 
@@ -93,6 +98,8 @@ impl ComparisonThread {
 /// A scene that was opened for questions, and the camera that it looks from.
 struct OpenScene {
     generation: u64,
+    /// Encoder that it was opened with.
+    encoder: Option<String>,
     scene: Result<CompareSubject, String>,
     looks_from: Option<Camera>,
     /// Milliseconds of rendering what phrases need of the view.
@@ -112,7 +119,8 @@ fn answer_all(
             question = newer;
         }
         // Scenes that are no longer asked give their memory back.
-        open.retain(|scene| question.scenes.iter().any(|asked| asked.generation() == scene.generation));
+        let is_asked = |scene: &OpenScene| question.scenes.iter().any(|asked| asked.generation() == scene.generation);
+        open.retain(|scene| scene.encoder == question.encoder && is_asked(scene));
         let mut answers: Vec<Option<Arc<ComparedAnswer>>> = vec![None; question.scenes.len()];
         for (k, scene) in question.scenes.iter().enumerate() {
             if !asked.is_empty() {
@@ -139,8 +147,9 @@ fn answer(
 ) -> ComparedAnswer {
     let generation = asked.generation();
     if !open.iter().any(|known| known.generation == generation) {
-        let scene = asked.open().map_err(|e| e.to_string());
-        open.push(OpenScene { generation, scene, looks_from: None, blend_ms: 0.0 });
+        let encoder = question.encoder.clone();
+        let scene = asked.open(encoder.as_deref()).map_err(|e| e.to_string());
+        open.push(OpenScene { generation, encoder, scene, looks_from: None, blend_ms: 0.0 });
     }
     let Some(known) = open.iter_mut().find(|known| known.generation == generation) else { return Err(String::new()) };
     let scene = known.scene.as_mut().map_err(|why| why.clone())?;
@@ -164,13 +173,15 @@ fn answer(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::io::results::Method;
     use crate::io::results::tests::{expected, samples};
     use crate::jobs::open;
     use crate::math::stats::worst_difference;
     use crate::pipeline::semantics::query::recipe::LERFS_PHRASES;
 
     fn asked(path: &str) -> Versioned<AskedScene> {
-        Versioned::new(Arc::new(AskedScene::Result(samples().join(path))))
+        let method = if path == "saga" { Method::Saga } else { Method::LangSplat };
+        Versioned::new(Arc::new(AskedScene::Result(samples().join(path), method)))
     }
 
     #[test]
@@ -189,7 +200,7 @@ mod tests {
             vec![asked("langsplat/output"), asked("saga"), asked("no such folder"), asked("langsplat_v2/output")];
         let question = |phrase: &str| {
             let (camera, asks) = (camera.clone(), AskedOfAll::Phrase(phrase.to_owned()));
-            Arc::new(CompareQuestion { scenes: scenes.clone(), camera, asks })
+            Arc::new(CompareQuestion { scenes: scenes.clone(), camera, asks, encoder: None })
         };
         sender.send(question("an older one")).expect("room");
         sender.send(question("kettle")).expect("room");
@@ -216,7 +227,7 @@ mod tests {
         let (slot, repaint): (Slot<ComparedAnswers>, Repaint) = (Slot::default(), Arc::new(|| {}));
         let asks = AskedOfAll::Pixel(PointedPixel { at: [7, 6], scale: 0.5, threshold: 0.9 });
         let scenes = vec![asked("saga"), asked("langsplat/output")];
-        sender.send(Arc::new(CompareQuestion { scenes, camera, asks })).expect("room");
+        sender.send(Arc::new(CompareQuestion { scenes, camera, asks, encoder: None })).expect("room");
         drop(sender);
         answer_all(&receiver, &mut encode, &slot, &repaint);
         let (_, found) = slot.newer_than(0).expect("answered");

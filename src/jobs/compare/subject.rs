@@ -29,30 +29,43 @@ const OF_OPTIONS: [&str; 2] = ["--decoder", "--encoder"];
 #[derive(Clone, Debug)]
 pub(crate) enum AskedScene {
     /// A scene with objects.
-    Own(Scene, Arc<SemanticMap>),
-    /// A result with embeddings.
-    Result(PathBuf),
+    Own(Box<Scene>, Arc<SemanticMap>),
+    /// A result of a method.
+    Result(PathBuf, Method),
 }
 
 impl AskedScene {
     /// What can be asked of a scene with these objects; `None` if nothing can.
     pub(crate) fn of(scene: &Scene, map: Option<&Arc<SemanticMap>>) -> Option<Self> {
-        let by_objects = || map.map(|map| Self::Own(scene.clone(), Arc::clone(map)));
-        match scene.method.map(Method::kind) {
-            Some(MethodKind::Embeddings | MethodKind::Clusters) => Some(Self::Result(scene.path.clone())),
-            Some(MethodKind::Affinities) => by_objects().or_else(|| Some(Self::Result(scene.path.clone()))),
-            Some(MethodKind::Classes) | None => by_objects(),
+        let by_objects = || map.map(|map| Self::Own(Box::new(scene.clone()), Arc::clone(map)));
+        let Some(method) = scene.method else { return by_objects() };
+        let by_values = || Some(Self::Result(scene.path.clone(), method));
+        match method.kind() {
+            MethodKind::Embeddings | MethodKind::Clusters => by_values(),
+            MethodKind::Affinities => by_objects().or_else(by_values),
+            MethodKind::Classes => by_objects(),
         }
     }
 
-    /// Opens it.
+    /// Opens it; `encoder` encodes phrases for a result that knows language, in place of its authors'.
     ///
     /// # Errors
     /// If it cannot be read, or the encoder of its objects is not here.
-    pub(crate) fn open(&self) -> Result<CompareSubject, JobError> {
+    pub(crate) fn open(&self, encoder: Option<&str>) -> Result<CompareSubject, JobError> {
         match self {
-            Self::Own(scene, map) => CompareSubject::own(scene.clone(), (**map).clone()),
-            Self::Result(path) => CompareSubject::open(path, &ResultOptions::default()),
+            Self::Own(scene, map) => CompareSubject::own((**scene).clone(), (**map).clone()),
+            Self::Result(path, method) => {
+                let encoder = encoder.filter(|_| method.encoder().is_some()).map(str::to_owned);
+                CompareSubject::open(path, &ResultOptions { encoder, ..ResultOptions::default() })
+            }
+        }
+    }
+
+    /// Text encoder of its authors, if it is a result that knows language.
+    pub(crate) fn encoder(&self) -> Option<&'static str> {
+        match self {
+            Self::Own(..) => None,
+            Self::Result(_, method) => method.encoder(),
         }
     }
 }

@@ -13,6 +13,7 @@ use crate::io::results::tests::{expected, sample, samples, with_class_names};
 use crate::io::trained::SceneCamera;
 use crate::jobs::evaluate_masks::Protocol;
 use crate::jobs::{Scene, export};
+use crate::models::ModelError;
 use crate::pipeline::observer::Silent;
 use crate::pipeline::semantics::evaluation::by_rule::{CutRule, PhraseInView};
 use crate::pipeline::semantics::query::foreign::own_rules::ForeignMask;

@@ -117,7 +117,14 @@ fn result(method: Method, cloud: GaussianCloud, levels: Vec<EmbeddedLevel>) -> M
         values: LevelValues::Embedded(level),
     };
     let levels = LEVELS.into_iter().zip(levels).map(level).collect();
-    MethodResult { method, path: PathBuf::from(NOWHERE), cloud: Arc::clone(&cloud), cameras: cameras(), levels }
+    MethodResult {
+        method,
+        path: PathBuf::from(NOWHERE),
+        encoder: method.encoder().map(str::to_owned),
+        cloud: Arc::clone(&cloud),
+        cameras: cameras(),
+        levels,
+    }
 }
 
 fn cameras() -> Vec<SceneCamera> {

@@ -5,6 +5,7 @@ use egui::{ComboBox, Event, Id, Key, RichText, Slider, TextEdit, Ui};
 use super::super::legend;
 use super::{COLORS, Compared};
 use crate::jobs::compare::cell::ShownRelevancy;
+use crate::jobs::models::ModelRole;
 use crate::ui::actions::Action;
 use crate::ui::ctx::Ctx;
 use crate::ui::text_field::take_keyboard;
@@ -28,6 +29,7 @@ impl Compared {
             self.pointed(ui);
             self.scale(ui);
             self.rule(ui);
+            self.encoder(ui, cx);
             let label = ui.label(RichText::new("Opacity").small()).id;
             ui.spacing_mut().slider_width = 70.0;
             let opacity = Slider::new(&mut self.choices.opacity, 0.0..=1.0).show_value(false);
@@ -121,6 +123,24 @@ impl Compared {
             }
         });
         choice.response.on_hover_text("Scale of relevancy, one for all views").accessible_name("Scale");
+    }
+
+    /// Draws the choice of the text encoder, if a scene is asked by one.
+    fn encoder(&mut self, ui: &mut Ui, cx: &Ctx<'_>) {
+        let own: Vec<&str> = self.scenes.iter().flatten().filter_map(|scene| scene.encoder()).collect();
+        let Some(models) = cx.state.models.as_ref().filter(|_| !own.is_empty()) else { return };
+        let all = models.of(ModelRole::Encoder).filter(|(_, state)| state.is_usable());
+        let usable: Vec<String> = all.map(|(entry, _)| entry.id.clone()).collect();
+        let chosen = self.choices.encoder.clone().unwrap_or_else(|| "its own".into());
+        let choice = ComboBox::from_id_salt("encoder").selected_text(format!("Encoder: {chosen}")).width(150.0);
+        let choice = choice.show_ui(ui, |ui| {
+            ui.selectable_value(&mut self.choices.encoder, None, "its own").on_hover_text(own.join(", "));
+            for id in usable {
+                ui.selectable_value(&mut self.choices.encoder, Some(id.clone()), id);
+            }
+        });
+        let tip = "Text encoder of phrases for results that know language: that of their authors, or the one that they were trained with";
+        choice.response.on_hover_text(tip).accessible_name("Encoder");
     }
 
     fn rule(&mut self, ui: &mut Ui) {

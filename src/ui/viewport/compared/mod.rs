@@ -38,6 +38,8 @@ struct ComparedChoices {
     size: f32,
     /// Score of what is alike to a point, where a method has scores.
     threshold: f32,
+    /// Encoder of phrases for results, in place of their authors'.
+    encoder: Option<String>,
 }
 
 impl ComparedChoices {
@@ -49,7 +51,14 @@ impl ComparedChoices {
 
 impl Default for ComparedChoices {
     fn default() -> Self {
-        Self { scale: ShownRelevancy::Raw, by_common_rule: false, opacity: 0.75, size: 0.5, threshold: 0.8 }
+        Self {
+            scale: ShownRelevancy::Raw,
+            by_common_rule: false,
+            opacity: 0.75,
+            size: 0.5,
+            threshold: 0.8,
+            encoder: None,
+        }
     }
 }
 
@@ -116,13 +125,13 @@ impl Compared {
         let at = camera.project(point)?;
         let is_inside = |at: f64, side: u32| (0.0..f64::from(side)).contains(&at);
         let is_in_view = is_inside(at.x, camera.width_px) && is_inside(at.y, camera.height_px);
-        let ComparedChoices { size, threshold, .. } = self.choices;
-        let pixel = || PointedPixel { at: [at.x as usize, at.y as usize], scale: size, threshold };
+        let (scale, threshold) = (self.choices.size, self.choices.threshold);
+        let pixel = || PointedPixel { at: [at.x as usize, at.y as usize], scale, threshold };
         is_in_view.then(|| AskedOfAll::Pixel(pixel()))
     }
 
     /// The phrase in the field, if there is one.
-    pub(crate) fn phrase(&self) -> Option<&str> {
+    pub fn phrase(&self) -> Option<&str> {
         Some(self.typed.trim()).filter(|text| !text.is_empty())
     }
 
@@ -131,7 +140,7 @@ impl Compared {
         let Some(scene) = &state.scene else { return };
         let made_of = (state.scene_number, state.semantics.as_ref().map(Versioned::generation));
         if self.scenes.is_empty() || self.made_of != made_of {
-            let map = state.semantics.as_ref().map(|map| &**map);
+            let map = state.semantics.as_deref();
             let first = AskedScene::of(&scene.scene, map).filter(|_| scene.remote.is_none());
             let first = first.map(|asked| Versioned::new(Arc::new(asked)));
             self.point = self.point.filter(|_| self.made_of.0 == made_of.0);
@@ -164,7 +173,8 @@ impl Compared {
             match self.asked_in(&camera) {
                 Some(asks) => {
                     let scenes = self.scenes.iter().flatten().cloned().collect();
-                    self.send(ctx, CompareQuestion { scenes, camera, asks });
+                    let encoder = self.choices.encoder.clone();
+                    self.send(ctx, CompareQuestion { scenes, camera, asks, encoder });
                 }
                 None => (self.asked, self.answers) = (None, None),
             }
@@ -197,7 +207,7 @@ impl Compared {
     /// Answer of the scene in a view to the phrase in the field, if it has come.
     fn answer(&self, index: usize) -> Option<&Arc<ComparedAnswer>> {
         let (answers, asked) = (self.answers.as_ref()?, self.asked.as_ref()?);
-        if answers.question.asks != asked.asks {
+        if answers.question.asks != asked.asks || answers.question.encoder != asked.encoder {
             return None;
         }
         let generation = self.scenes.get(index)?.as_ref()?.generation();
