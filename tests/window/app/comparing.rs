@@ -29,13 +29,13 @@ fn open_beside(w: &mut Window, path: PathBuf, count: usize) {
 fn one_phrase_is_asked_of_all_scenes() {
     let folder = tempfile::tempdir().expect("folder");
     let mut w = window(folder.path());
-    assert!(!w.shows("Scale: "), "the control: one scene has its own queries");
+    assert!(!w.shows("Scale of relevancy"), "the control: one scene has its own queries");
     let again = folder.path().join("again");
     copy(&folder.path().join("scene"), &again);
     let result = sample("langsplat/output", folder.path());
     open_beside(&mut w, again.clone(), 1);
     open_beside(&mut w, result.clone(), 2);
-    assert!(w.shows("Scale: Raw") && w.shows("again") && w.shows("LangSplat: "));
+    assert!(w.shows("Scale of relevancy") && w.shows("again") && w.shows("LangSplat: "));
     let place = w.app().viewport.pose().center;
     w.press(Key::Slash);
     w.types("box 1");
@@ -66,7 +66,7 @@ fn one_phrase_is_asked_of_all_scenes() {
     w.ask(Action::CloseComparison(None));
     w.until("one view", |a| a.viewport.picture().is_some_and(|p| p.beside.is_empty()));
     w.harness.run_steps(2);
-    assert!(!w.shows("Scale: "));
+    assert!(!w.shows("Scale of relevancy"));
 }
 
 #[test]
@@ -103,7 +103,7 @@ fn a_result_with_embeddings_alone_is_asked_in_its_view() {
     let mut w = Window::new(Some(Action::Open(sample("langsplat/output", folder.path()))));
     w.until("a picture", |a| a.viewport.picture().is_some_and(|p| p.full));
     w.harness.run_steps(2);
-    assert!(w.shows("Scale: Raw"));
+    assert!(w.shows("Scale of relevancy"));
     w.press(Key::Slash);
     w.types("kettle");
     assert!(shows_soon(&mut w, "clip-vit-b16"), "the encoder that is missing is named");
@@ -113,7 +113,7 @@ fn a_result_with_embeddings_alone_is_asked_in_its_view() {
     let mut w = Window::new(Some(Action::Open(plain)));
     w.until("a picture", |a| a.viewport.picture().is_some_and(|p| p.full));
     w.harness.run_steps(2);
-    assert!(!w.shows("Scale: "));
+    assert!(!w.shows("Scale of relevancy"));
 }
 
 #[test]
@@ -122,7 +122,7 @@ fn a_click_asks_what_a_point_belongs_to_and_a_result_becomes_a_scene() {
     let mut w = Window::new(Some(Action::Open(sample("saga", folder.path()))));
     w.until("a picture", |a| a.viewport.picture().is_some_and(|p| p.full && p.median_depth.is_some()));
     w.harness.run_steps(2);
-    assert!(w.shows("click a thing") && !w.shows("Threshold"));
+    assert!(w.shows("Scale of relevancy") && !w.shows("Threshold"));
     // A pixel with a surface.
     let view = w.harness.get_by_label("Viewport").rect();
     let at = {
@@ -150,5 +150,5 @@ fn a_click_asks_what_a_point_belongs_to_and_a_result_becomes_a_scene() {
     let made = folder.path().join("made");
     w.ask(Action::Import(made.clone()));
     w.until("the scene", |a| a.state.scene.as_ref().is_some_and(|s| s.out == made));
-    assert!(made.join("scene.json").is_file() && !w.shows("click a thing"), "a scene has its own queries");
+    assert!(made.join("scene.json").is_file() && !w.shows("Scale of relevancy"), "a scene has its own queries");
 }

@@ -122,7 +122,7 @@ impl Compared {
                 ui.selectable_value(&mut self.choices.scale, scale, name).on_hover_text(tip);
             }
         });
-        choice.response.on_hover_text("Scale of relevancy, one for all views").accessible_name("Scale");
+        choice.response.on_hover_text("Scale of relevancy, one for all views").accessible_name("Scale of relevancy");
     }
 
     /// Draws the choice of the text encoder, if a scene is asked by one.

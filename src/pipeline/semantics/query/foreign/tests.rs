@@ -133,7 +133,7 @@ fn packed_weights_answer_like_the_blended_ones_of_the_sample() {
         let found =
             seen.scene.pixel_relevancy(&mut seen.renderer, &seen.view, level, texts.phrase()).expect("answered");
         let difference = apart(&found, &plain);
-        assert!(difference < 2e-5, "{level}: {difference}");
+        assert!(difference < 5e-5, "{level}: {difference}");
         blended.planes.rotate_left(1);
         let turned = PackedWeights::new(&head, &blended);
         let turned = relevancy(&turned.compared(&directions), 10.0);
@@ -313,8 +313,12 @@ fn a_pixel_tells_what_it_belongs_to() {
     );
     // THGS: levels by scale; embeddings alone tell nothing.
     let thgs = Seen::new("thgs");
-    let at = |scale| thgs.scene.pointed(&thgs.view, pixel([12, 9], scale)).expect("clusters").map(|f| f.level);
-    assert_eq!([at(0.0), at(1.0)], [Some(0), Some(2)]);
+    let at = |place, scale| thgs.scene.pointed(&thgs.view, pixel(place, scale)).expect("clusters").map(|f| f.level);
+    let (w, h) = thgs.view.size();
+    let levels = (0..w * h).map(|i| [0.0, 1.0].map(|scale| at([i % w, i / w], scale)));
+    let both: Vec<[Option<usize>; 2]> = levels.collect();
+    assert!(both.contains(&[Some(0), Some(2)]) && both.contains(&[None, None]));
+    assert!(both.iter().all(|[fine, coarse]| fine.is_none_or(|k| k == 0) && coarse.is_none_or(|k| k == 2)));
     let embeddings = Seen::new("langsplat/output");
     let none = embeddings.scene.pointed(&embeddings.view, pixel([12, 9], 0.5));
     assert!(matches!(none, Err(ForeignError::NoIdentities("LangSplat"))));
