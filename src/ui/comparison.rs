@@ -4,7 +4,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use crate::jobs::compare::MOST_SCENES;
-use crate::jobs::compare::subject::AskedScene;
+use crate::jobs::compare::subject::AskableScene;
 use crate::jobs::{OpenedScene, Scene};
 use crate::render::RenderSettings;
 use crate::scene::GaussianCloud;
@@ -22,8 +22,8 @@ pub struct ComparedScene {
     pub(crate) cloud: Versioned<GaussianCloud>,
     /// Render settings that it was trained with.
     pub(crate) settings: RenderSettings,
-    /// What it can be asked, if anything.
-    pub(crate) asked: Option<Versioned<AskedScene>>,
+    /// The scene as it is asked, if it answers anything.
+    pub(crate) asked: Option<Versioned<AskableScene>>,
     /// True if a removal from the current scene made it.
     pub(crate) is_removal: bool,
 }
@@ -32,7 +32,8 @@ impl ComparedScene {
     /// Content of a scene for a view; `None` if it has no Gaussians.
     pub(crate) fn of(scene: OpenedScene) -> Option<Self> {
         let cloud = Versioned::new(Arc::clone(scene.gaussians()?));
-        let asked = AskedScene::of(&scene.scene, scene.semantics.as_ref()).map(|asked| Versioned::new(Arc::new(asked)));
+        let asked =
+            AskableScene::of(&scene.scene, scene.semantics.as_ref()).map(|asked| Versioned::new(Arc::new(asked)));
         let Scene { name, path, settings, method, .. } = scene.scene;
         let name = method.map_or_else(|| name.clone(), |method| format!("{}: {name}", method.name()));
         Some(Self { name, path, cloud, settings, asked, is_removal: false })

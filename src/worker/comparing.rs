@@ -13,7 +13,7 @@ use super::thread::panic_failure;
 use super::{Slot, Versioned};
 use crate::jobs::JobError;
 use crate::jobs::compare::answer::PhraseAnswer;
-use crate::jobs::compare::subject::{AskedScene, CompareSubject};
+use crate::jobs::compare::subject::{AskableScene, CompareSubject};
 use crate::jobs::compare::vectors::{InstalledEncoders, KnownVectors, TextFunction};
 use crate::pipeline::semantics::query::foreign::pointed::PointedPixel;
 use crate::pipeline::semantics::query::timing::ms_since;
@@ -22,11 +22,11 @@ use crate::scene::Camera;
 /// Requests that may wait; only the newest is read.
 const QUEUED: usize = 16;
 
-/// What all scenes are asked.
+/// Question to all scenes.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) enum AskedOfAll {
     Phrase(String),
-    /// What a pixel of the view belongs to.
+    /// The thing that a pixel of the view belongs to.
     Pixel(PointedPixel),
 }
 
@@ -34,7 +34,7 @@ pub(crate) enum AskedOfAll {
 #[derive(Clone, Debug)]
 pub(crate) struct CompareQuestion {
     /// Scenes in the order of their views; a scene whose generation changes is opened again.
-    pub(crate) scenes: Vec<Versioned<AskedScene>>,
+    pub(crate) scenes: Vec<Versioned<AskableScene>>,
     pub(crate) camera: Camera,
     pub(crate) asks: AskedOfAll,
     /// Encoder of phrases for results, in place of their authors'.
@@ -140,7 +140,7 @@ fn answer_all(
 
 /// Answer of a scene, which is opened and turned to the view first if needed.
 fn answer(
-    asked: &Versioned<AskedScene>,
+    asked: &Versioned<AskableScene>,
     question: &CompareQuestion,
     open: &mut Vec<OpenScene>,
     vectors: &mut KnownVectors<'_>,
@@ -179,9 +179,9 @@ mod tests {
     use crate::math::stats::worst_difference;
     use crate::pipeline::semantics::query::recipe::LERFS_PHRASES;
 
-    fn asked(path: &str) -> Versioned<AskedScene> {
+    fn asked(path: &str) -> Versioned<AskableScene> {
         let method = if path == "saga" { Method::Saga } else { Method::LangSplat };
-        Versioned::new(Arc::new(AskedScene::Result(samples().join(path), method)))
+        Versioned::new(Arc::new(AskableScene::Result(samples().join(path), method)))
     }
 
     #[test]

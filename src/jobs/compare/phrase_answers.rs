@@ -1,4 +1,4 @@
-//! What a comparison asks of a scene of any method.
+//! Questions of a comparison to a scene of any method.
 
 use super::vectors::KnownVectors;
 use crate::jobs::JobError;

@@ -27,15 +27,15 @@ const OF_OPTIONS: [&str; 2] = ["--decoder", "--encoder"];
 
 /// A scene that is opened for questions once it is asked.
 #[derive(Clone, Debug)]
-pub(crate) enum AskedScene {
+pub(crate) enum AskableScene {
     /// A scene with objects.
     Own(Box<Scene>, Arc<SemanticMap>),
     /// A result of a method.
     Result(PathBuf, Method),
 }
 
-impl AskedScene {
-    /// What can be asked of a scene with these objects; `None` if nothing can.
+impl AskableScene {
+    /// A scene with these objects; `None` if it answers nothing.
     pub(crate) fn of(scene: &Scene, map: Option<&Arc<SemanticMap>>) -> Option<Self> {
         let by_objects = || map.map(|map| Self::Own(Box::new(scene.clone()), Arc::clone(map)));
         let Some(method) = scene.method else { return by_objects() };

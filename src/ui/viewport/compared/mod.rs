@@ -13,7 +13,7 @@ use self::painted::PaintedAnswer;
 use super::split::ViewArea;
 use crate::jobs::compare::answer::PhraseAnswer;
 use crate::jobs::compare::cell::ShownRelevancy;
-use crate::jobs::compare::subject::AskedScene;
+use crate::jobs::compare::subject::AskableScene;
 use crate::math::colormap::Colormap;
 use crate::pipeline::semantics::query::foreign::own_rules::ForeignMask;
 use crate::pipeline::semantics::query::foreign::pointed::PointedPixel;
@@ -75,7 +75,7 @@ pub struct Compared {
     choices: ComparedChoices,
     thread: Option<ComparisonThread>,
     /// The scenes in the order of their views.
-    scenes: Vec<Option<Versioned<AskedScene>>>,
+    scenes: Vec<Option<Versioned<AskableScene>>>,
     /// Scene and objects that the first of them was made of.
     made_of: (u64, Option<u64>),
     asked: Option<Arc<CompareQuestion>>,
@@ -119,7 +119,7 @@ impl Compared {
         self.point.is_some() || self.phrase().is_some()
     }
 
-    /// What is asked in the view of a camera; `None` if nothing is, or if the point is out of sight.
+    /// The question in the view of a camera; `None` if nothing is asked, or if the point is out of sight.
     fn asked_in(&self, camera: &Camera) -> Option<AskedOfAll> {
         let Some(point) = self.point else { return self.phrase().map(|text| AskedOfAll::Phrase(text.to_owned())) };
         let at = camera.project(point)?;
@@ -141,7 +141,7 @@ impl Compared {
         let made_of = (state.scene_number, state.semantics.as_ref().map(Versioned::generation));
         if self.scenes.is_empty() || self.made_of != made_of {
             let map = state.semantics.as_deref();
-            let first = AskedScene::of(&scene.scene, map).filter(|_| scene.remote.is_none());
+            let first = AskableScene::of(&scene.scene, map).filter(|_| scene.remote.is_none());
             let first = first.map(|asked| Versioned::new(Arc::new(asked)));
             self.point = self.point.filter(|_| self.made_of.0 == made_of.0);
             (self.scenes, self.made_of) = (vec![first], made_of);

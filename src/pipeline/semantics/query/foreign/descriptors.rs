@@ -4,7 +4,7 @@
 use crate::io::results::ClusterLevel;
 use crate::math::vector::unit;
 
-/// What the best embedding of a cluster answers, or those of a Gaussian's clusters.
+/// Answer of the best embedding of a cluster, or of those of a Gaussian's clusters.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct DescriptorAnswer {
     /// Relevancy times weight, 0 or more.

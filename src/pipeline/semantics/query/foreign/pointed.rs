@@ -1,4 +1,4 @@
-//! What a method says of a pixel: its cluster, its class, or all that is alike to it.
+//! Pixels that are pointed at: their cluster, their class, or all that is alike to them.
 
 use super::ForeignError;
 use super::asked::{ForeignScene, ForeignView, LevelView};
