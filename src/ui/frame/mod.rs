@@ -85,6 +85,9 @@ fn take_news(app: &mut App, ctx: &egui::Context) {
     app.photos.update(ctx, state);
     app.photos.runs.update(ctx, state, tasks, workspace);
     app.thumbnails.update(ctx, state, viewport.cloud().map(|c| &**c), tasks);
+    if viewport.compared.is_on() {
+        app.models.keep_listed(state, tasks);
+    }
     app.models.update(state);
     if app.layout.shows(Pane::Training) {
         app.training.curves = app.report.curves(state);

@@ -77,7 +77,8 @@ impl ViewCards<'_> {
         let (modes, legend) = if second { ("second modes", "second legend") } else { ("modes", "legend") };
         let menus = cx.layout.split_view || rect.width() < NARROW;
         card(ui, rect, modes, Align2::LEFT_TOP, 0.0, |ui| {
-            self.modes(ui, menus, is_other, photos > 0, cx);
+            // One card asks all scenes that are compared.
+            self.modes(ui, menus, is_other || figures.is_some(), photos > 0, cx);
         });
         let other_depth = |p: &ViewPicture| p.second().filter(|_| second).map(|other| other.depth_range);
         let depth = self.display.picture().and_then(|p| other_depth(p).unwrap_or(p.depth_range));

@@ -107,6 +107,11 @@ impl Viewport {
         }
     }
 
+    /// Returns whether all scenes on screen are asked something.
+    fn asks_all(&self) -> bool {
+        self.compared.is_on() && self.compared.asks()
+    }
+
     /// Draws the pane of the query: its answer and the options.
     pub(crate) fn show_query(&mut self, ui: &mut Ui, cx: &mut Ctx<'_>) {
         let state = cx.state;
@@ -121,7 +126,7 @@ impl Viewport {
     /// seen through a photo's camera.
     fn has_nothing_to_look_at(&self) -> bool {
         let is_free = self.tool.is_none() && self.photo.is_none() && !self.visibility.is_isolated();
-        is_free && self.picking.selected().is_none() && !self.queries.is_asked()
+        is_free && self.picking.selected().is_none() && !self.queries.is_asked() && !self.asks_all()
     }
 
     /// The frame in a view: all of it, or what the photo's aspect ratio leaves.
@@ -237,7 +242,8 @@ impl Viewport {
                 orthographic: self.eye.straight_name(state.scene.as_ref().map(|scene| &scene.home)),
                 queries: &mut self.queries,
             };
-            cards.show(ui, area, self.compared.figures(area.index, truth.as_deref()), cx);
+            let name = state.scene.as_ref().map_or("", |scene| &scene.name);
+            cards.show(ui, area, self.compared.figures(area.index, name, truth.as_deref()), cx);
             if let Some((semantics, cloud)) = searched.filter(|_| !self.compared.is_on()) {
                 let scene = SearchedScene { semantics, cloud, visibility: &self.visibility };
                 if query::panel::show(ui, &mut self.queries, area.rect, first, scene, cx) {

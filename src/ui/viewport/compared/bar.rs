@@ -24,9 +24,13 @@ const SCALES: [(ShownRelevancy, &str, &str); 3] = [
 impl Compared {
     /// Draws the bar.
     pub(in crate::ui::viewport) fn bar(&mut self, ui: &mut Ui, cx: &mut Ctx<'_>) {
+        // Two rows, so that nothing moves as a point is chosen.
         ui.horizontal_wrapped(|ui| {
             self.field(ui, cx.state.beside.len() + 1);
+            actions(ui, cx);
             self.pointed(ui);
+        });
+        ui.horizontal_wrapped(|ui| {
             self.scale(ui);
             self.rule(ui);
             self.encoder(ui, cx);
@@ -34,28 +38,7 @@ impl Compared {
             ui.spacing_mut().slider_width = 70.0;
             let opacity = Slider::new(&mut self.choices.opacity, 0.0..=1.0).show_value(false);
             ui.add(opacity).on_hover_text("Opacity of relevancy").labelled_by(label);
-            if self.asks() {
-                legend::bar(ui, COLORS, self.range().map(|v| format!("{v:.2}")));
-            }
-            if cx.state.scene.as_ref().is_some_and(|scene| scene.method.is_some()) && cx.state.beside.is_empty() {
-                ui.separator();
-                if ui.button("Import\u{2026}").on_hover_text(Action::ChooseImport.tooltip()).clicked() {
-                    cx.ask(Action::ChooseImport);
-                }
-            }
-            if !cx.state.beside.is_empty() {
-                ui.separator();
-                let save = ui.button("Save sheet\u{2026}").on_hover_text(Action::ChooseSheetFolder.tooltip());
-                if save.accessible_name(Action::ChooseSheetFolder.text()).clicked() {
-                    cx.ask(Action::ChooseSheetFolder);
-                }
-                if ui.button("Add\u{2026}").on_hover_text(Action::ChooseComparison.tooltip()).clicked() {
-                    cx.ask(Action::ChooseComparison);
-                }
-                if ui.button("End").on_hover_text(Action::CloseComparison(None).text()).clicked() {
-                    cx.ask(Action::CloseComparison(None));
-                }
-            }
+            legend::bar(ui, COLORS, self.range().map(|v| format!("{v:.2}")));
             if let Some(why) = &self.problem {
                 ui.colored_label(theme::error(), why);
             }
@@ -90,7 +73,8 @@ impl Compared {
         if self.point.is_none() {
             return;
         }
-        ui.label("or the point").on_hover_text("Clicked: what each scene says that it belongs to.");
+        ui.separator();
+        ui.label("Point").on_hover_text("Clicked: what each scene says that it belongs to.");
         ui.spacing_mut().slider_width = 70.0;
         let slider = |ui: &mut Ui, name: &str, value: &mut f32, tip: &str| {
             let label = ui.label(RichText::new(name).small()).id;
@@ -156,4 +140,25 @@ impl Compared {
             "Outlined: the mask by each method's own rule (the common one where it has none), or by one rule for all";
         choice.response.on_hover_text(tip).accessible_name("Masks");
     }
+}
+
+/// Draws the buttons for all that is compared, or for a result alone.
+fn actions(ui: &mut Ui, cx: &mut Ctx<'_>) {
+    let state = cx.state;
+    let mut button = |ui: &mut Ui, text: &str, action: Action| {
+        let button = ui.button(text).on_hover_text(action.tooltip());
+        if button.accessible_name(action.text()).clicked() {
+            cx.ask(action);
+        }
+    };
+    let is_alone = state.beside.is_empty();
+    if is_alone && state.scene.as_ref().is_some_and(|scene| scene.method.is_some()) {
+        button(ui, "Import\u{2026}", Action::ChooseImport);
+    }
+    if is_alone {
+        return button(ui, "Compare\u{2026}", Action::ChooseComparison);
+    }
+    button(ui, "Save sheet\u{2026}", Action::ChooseSheetFolder);
+    button(ui, "Add\u{2026}", Action::ChooseComparison);
+    button(ui, "End", Action::CloseComparison(None));
 }

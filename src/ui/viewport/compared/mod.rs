@@ -6,7 +6,7 @@ mod painted;
 
 use std::sync::Arc;
 
-use egui::{Color32, Pos2, RichText, Stroke, Ui};
+use egui::{Color32, Label, Pos2, RichText, Stroke, Ui};
 use glam::DVec3;
 
 use self::painted::PaintedAnswer;
@@ -17,7 +17,7 @@ use crate::jobs::compare::subject::AskableScene;
 use crate::math::colormap::Colormap;
 use crate::pipeline::semantics::query::foreign::own_rules::ForeignMask;
 use crate::pipeline::semantics::query::foreign::pointed::PointedPixel;
-use crate::scene::{Camera, Mask};
+use crate::scene::{Camera, Mask, text};
 use crate::ui::state::AppState;
 use crate::ui::theme;
 use crate::worker::Versioned;
@@ -26,6 +26,8 @@ use crate::worker::view::ViewPicture;
 
 /// Longer side of the views that are asked, px.
 const SIDE_PX: u32 = 800;
+/// Width of a card with figures at most, points.
+const MOST_PT: f32 = 300.0;
 
 /// Choices of what the views show.
 #[derive(Clone, Debug, PartialEq)]
@@ -115,7 +117,7 @@ impl Compared {
     }
 
     /// True if something is asked.
-    fn asks(&self) -> bool {
+    pub(super) fn asks(&self) -> bool {
         self.point.is_some() || self.phrase().is_some()
     }
 
@@ -271,7 +273,7 @@ impl Compared {
     }
 
     /// Figures of the answer in a view: a short line, and all of it; or why there is none.
-    pub(super) fn figures(&self, index: usize, truth: Option<&Mask>) -> Option<AnswerFigures> {
+    pub(super) fn figures(&self, index: usize, name: &str, truth: Option<&Mask>) -> Option<AnswerFigures> {
         if !self.is_on || !self.asks() {
             return None;
         }
@@ -283,10 +285,15 @@ impl Compared {
                 let more = "It has neither objects nor embeddings.".to_owned();
                 Some(AnswerFigures { text: "cannot be asked".into(), more, is_problem: true })
             }
-            Some(Err(why)) => {
-                Some(AnswerFigures { text: crate::scene::text::elided(why, 60), more: why.clone(), is_problem: true })
+            Some(Err(why)) => Some(AnswerFigures { text: why.clone(), more: String::new(), is_problem: true }),
+            Some(Ok(answer)) => {
+                let figures = self.figures_of(answer, truth);
+                // The first view has no card with its name.
+                let is_first = index == 0 && self.scenes.len() > 1;
+                let text =
+                    if is_first { format!("{} \u{b7} {}", text::elided(name, 30), figures.text) } else { figures.text };
+                Some(AnswerFigures { text, ..figures })
             }
-            Some(Ok(answer)) => Some(self.figures_of(answer, truth)),
         }
     }
 
@@ -332,7 +339,12 @@ pub(super) struct AnswerFigures {
 impl AnswerFigures {
     pub(super) fn show(&self, ui: &mut Ui) {
         let color = if self.is_problem { theme::warning() } else { theme::text() };
-        ui.label(RichText::new(&self.text).small().color(color)).on_hover_text(&self.more);
+        // Of a long reason all is shown, in lines.
+        ui.set_max_width(MOST_PT);
+        let label = ui.add(Label::new(RichText::new(&self.text).small().color(color)).wrap());
+        if !self.more.is_empty() {
+            label.on_hover_text(&self.more);
+        }
     }
 }
 
