@@ -173,7 +173,7 @@ impl AppState {
                 if let Some(long) = long {
                     let reached = long.progress.filter(|_| long.info.makes == Makes::Gaussians).map(|p| p.done);
                     self.resumable.iter_mut().zip(reached).for_each(|((_, step), reached)| *step = reached);
-                    self.toast(Tone::Info, format!("{}: canceled", long.info.title));
+                    self.toast(Tone::Info, format!("{}: stopped", long.info.title));
                 }
             }
             JobEnd::Failed(failure) => {

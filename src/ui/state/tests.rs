@@ -153,6 +153,22 @@ fn objects_carried_by_masks_are_found_after_training() {
 }
 
 #[test]
+fn a_stopped_training_says_how_far_it_came() {
+    let end = |stopped_at| {
+        let mut s = AppState {
+            resumable: Some((TrainConfig { steps: 150, ..TrainConfig::default() }, 0)),
+            ..AppState::default()
+        };
+        let (facts, runs) = (SceneFacts::default(), Vec::new());
+        let (evaluations, out, semantics) = (Vec::new(), PathBuf::from("out"), None);
+        s.trained(JOB, TrainedRun { evaluations, out, semantics, runs, stopped_at, facts });
+        s.toasts.last().map(|toast| toast.text.clone()).expect("a message")
+    };
+    assert_eq!(end(Some(92)), "Training stopped at step 92 of 150, saved");
+    assert_eq!(end(None), "Training finished", "the control");
+}
+
+#[test]
 fn the_recent_list_is_short_and_has_no_doubles() {
     let mut s = AppState::default();
     for i in (0..20).chain([19, 15]) {

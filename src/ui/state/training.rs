@@ -98,9 +98,9 @@ impl AppState {
         let origin = self.scene.as_ref().and_then(|scene| scene.remote.as_ref());
         let host = origin.map_or_else(String::new, |origin| format!(" on {}", origin.host));
         self.say(Tone::Info, format!("Saved to {}{host}", out.display()));
-        if stopped_at.is_some() {
-            let name = self.scene.as_ref().map_or("", |s| &s.name);
-            self.toast(Tone::Info, format!("Training {name}: canceled"));
+        if let Some(step) = stopped_at {
+            let whole = self.resumable.as_ref().map_or_else(String::new, |(config, _)| format!(" of {}", config.steps));
+            self.toast(Tone::Info, format!("Training stopped at step {step}{whole}, saved"));
             return false;
         }
         let quality = self.history.evaluations.last().map(|e| format!(", held-out PSNR {:.2} dB", e.psnr));

@@ -362,7 +362,7 @@ fn other_fills(ui: &mut Ui, last: &RemoveRequest, is_wide: bool, cx: &mut Ctx<'_
         }
         // A retrained scene also holds photos, which are not deleted.
         let delete = Action::DeleteRemoved;
-        if !last.retrain && ui.button(delete.text()).on_hover_text(delete.tooltip()).clicked() {
+        if !last.retrain && ui.button("Delete this copy\u{2026}").on_hover_text(delete.tooltip()).clicked() {
             cx.ask(delete);
             ui.close();
         }

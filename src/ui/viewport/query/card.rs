@@ -123,7 +123,8 @@ fn show_target(
         let (certainty, color, numbers) = certainty(newest);
         ui.colored_label(color, certainty).on_hover_text(numbers);
         if let Some(bounds) = facts.bounds {
-            ui.weak(size_text(bounds, state)).on_hover_text("Longest edge of its bounding box");
+            let text = format!("\u{b7} {} long", size_text(bounds, state));
+            ui.weak(text).on_hover_text("Longest edge of its bounding box");
         }
         let unseen = if is_empty { Some(EMPTY) } else { why_unseen(queries, scene, target) };
         if let Some(why) = unseen {
