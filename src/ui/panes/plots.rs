@@ -4,6 +4,7 @@ use egui::{Slider, Ui, Vec2b};
 use egui_plot::{GridMark, HoverPosition, Legend, Line, LineStyle, MarkerShape, Plot, PlotPoints, Points};
 
 use super::super::layout::{PlotAxis, PlotQuantity, PlotSettings};
+use super::super::paired::paired;
 use super::super::state::TrainHistory;
 use super::super::theme;
 use crate::math::format;
@@ -37,8 +38,10 @@ pub(crate) fn show(
         });
     });
     ui.horizontal_wrapped(|ui| {
-        let id = ui.label("Smoothing").id;
-        ui.add(Slider::new(&mut settings.smoothing, 0.0..=20.0).suffix(" %").fixed_decimals(0)).labelled_by(id);
+        paired(ui, "Smoothing".into(), 180.0, |ui, label| {
+            let smoothing = Slider::new(&mut settings.smoothing, 0.0..=20.0).suffix(" %").fixed_decimals(0);
+            ui.add(smoothing).labelled_by(label);
+        });
         if settings.quantity == PlotQuantity::Loss {
             ui.checkbox(&mut settings.log, "Log scale");
             ui.weak("L1 + 0.2 D-SSIM");

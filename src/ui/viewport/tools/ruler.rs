@@ -18,6 +18,7 @@ use crate::scene::upright_box::UprightBox;
 use crate::scene::{SemanticMap, text};
 use crate::ui::actions::Action;
 use crate::ui::ctx::Ctx;
+use crate::ui::paired::paired;
 use crate::ui::state::AppState;
 use crate::ui::{keys, theme};
 use crate::worker::Versioned;
@@ -41,12 +42,14 @@ pub(crate) struct Ruler {
     waiting: Vec<(Pose, DVec2)>,
     /// True if the last click met no surface.
     missed: bool,
+    /// Number of measurements in the list at the last redraw.
+    listed: usize,
 }
 
 impl Default for Ruler {
     fn default() -> Self {
         let (kind, points, waiting) = (MeasurementKind::Length, Vec::new(), Vec::new());
-        Self { kind, points, known: String::new(), waiting, missed: false }
+        Self { kind, points, known: String::new(), waiting, missed: false, listed: usize::MAX }
     }
 }
 
@@ -171,10 +174,11 @@ impl Ruler {
         match value {
             MeasuredValue::Length(_) => {
                 ui.separator();
-                ui.label("True length");
-                let known = TextEdit::singleline(&mut self.known).hint_text("0.30").desired_width(50.0);
-                ui.add(known).accessible_name("True length in meters");
-                ui.label("m");
+                paired(ui, "True length".into(), 90.0, |ui, _| {
+                    let known = TextEdit::singleline(&mut self.known).hint_text("0.30").desired_width(50.0);
+                    ui.add(known).accessible_name("True length in meters");
+                    ui.label("m");
+                });
                 let scale = self.scale();
                 let set = ui.add_enabled(scale.is_some(), Button::new("Set scale"));
                 if let Some(scale) = scale.filter(|_| set.clicked()) {
@@ -223,7 +227,9 @@ impl ViewTool for Ruler {
         card.show(ui, |ui, is_folded| {
             ui.spacing_mut().item_spacing.y = 5.0;
             if !is_folded {
-                list(ui, scene.measurements, meters_per_unit(state), cx);
+                let is_longer =
+                    scene.measurements.len() > std::mem::replace(&mut self.listed, scene.measurements.len());
+                list(ui, scene.measurements, meters_per_unit(state), is_longer, cx);
             }
             self.kinds(ui, cx);
             let value = self.kind.value(&self.measured(scene, state.semantics.as_ref()));
@@ -258,8 +264,8 @@ impl ViewTool for Ruler {
     }
 }
 
-/// Draws the kept measurements.
-fn list(ui: &mut Ui, all: &mut Vec<Measurement>, meters: Option<f64>, cx: &mut Ctx<'_>) {
+/// Draws the kept measurements, scrolled to the newest if `to_end`.
+fn list(ui: &mut Ui, all: &mut Vec<Measurement>, meters: Option<f64>, to_end: bool, cx: &mut Ctx<'_>) {
     if all.is_empty() {
         return;
     }
@@ -273,8 +279,9 @@ fn list(ui: &mut Ui, all: &mut Vec<Measurement>, meters: Option<f64>, cx: &mut C
     });
     let mut gone = None;
     ScrollArea::vertical().max_height(LIST_PT).show(ui, |ui| {
+        let last = all.len().saturating_sub(1);
         for (i, m) in all.iter_mut().enumerate() {
-            ui.horizontal(|ui| {
+            let row = ui.horizontal(|ui| {
                 let mut is_shown = !m.hidden;
                 let tick = ui.checkbox(&mut is_shown, "").on_hover_text("Show it in the view.");
                 tick.accessible_name(format!("{} is visible", m.name));
@@ -299,6 +306,9 @@ fn list(ui: &mut Ui, all: &mut Vec<Measurement>, meters: Option<f64>, cx: &mut C
                     }
                 });
             });
+            if to_end && i == last {
+                row.response.scroll_to_me(None);
+            }
         }
     });
     if let Some(gone) = gone {
