@@ -203,12 +203,17 @@ impl Tree<'_> {
             return self.name_field(ui, cx);
         }
         let is_selected = self.selected == Some(id);
-        let name = Button::new(self.labels.name(self.identities, id)).selected(is_selected).truncate();
+        let name = Button::new(self.labels.name_in_list(self.identities, id)).selected(is_selected).truncate();
         let name = ui.add(name.frame_when_inactive(is_selected));
         if self.scroll_to == Some(id) {
             name.scroll_to_me(Some(Align::Center));
         }
         let name = name.on_hover_ui(|ui| {
+            let [full, listed] =
+                [ScreenNames::name, ScreenNames::name_in_list].map(|of| of(self.labels, self.identities, id));
+            if full != listed {
+                ui.strong(full);
+            }
             ui.label("Select it and highlight it in the view; double-click to rename it");
             self.facts.line(id).into_iter().for_each(|line| drop(ui.weak(line)));
         });
