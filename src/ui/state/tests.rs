@@ -145,11 +145,16 @@ fn objects_carried_by_masks_are_found_after_training() {
         s.apply(Event::Ended(JOB, JobEnd::Finished));
         let facts = SceneFacts::default();
         let (out, evaluations, runs) = (PathBuf::from("out"), Vec::new(), Vec::new());
-        s.trained(JOB, TrainedRun { evaluations, out, semantics, runs, stopped_at: None, facts })
+        s.training_job = Some(JOB);
+        let finds = s.trained(JOB, TrainedRun { evaluations, out, semantics, runs, stopped_at: None, facts });
+        let carried = s.has_carried_objects;
+        s.set_semantics(Some(Arc::default()));
+        assert!(!s.has_carried_objects, "objects that are found are news");
+        (finds, carried)
     };
-    assert!(end(true, None));
-    assert!(!end(true, Some(Arc::default())), "they came along");
-    assert!(!end(false, None));
+    assert_eq!(end(true, None), (true, false));
+    assert_eq!(end(true, Some(Arc::default())), (false, true), "they came along");
+    assert_eq!(end(false, None), (false, false));
 }
 
 #[test]

@@ -80,6 +80,7 @@ impl AppState {
         (self.history, self.previous) = (before.history, before.previous);
         self.resumable = before.resumable;
         self.set_semantics(before.semantics);
+        self.has_carried_objects = true;
         true
     }
 
@@ -91,6 +92,7 @@ impl AppState {
             self.history.evaluations = evaluations;
             self.set_facts(facts);
             self.set_semantics(semantics);
+            self.has_carried_objects = carried;
             self.scene = self.scene.take().map(|s| Arc::new(OpenedScene { runs, ..s.trained_in(&out) }));
             let reached = stopped_at.or(self.history.steps.last().map(|s| s.step));
             self.resumable.iter_mut().zip(reached).for_each(|((_, step), reached)| *step = reached);
