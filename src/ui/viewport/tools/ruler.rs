@@ -173,7 +173,6 @@ impl Ruler {
     fn uses(&mut self, ui: &mut Ui, value: &MeasuredValue, eye: DVec3, cx: &mut Ctx<'_>) {
         match value {
             MeasuredValue::Length(_) => {
-                ui.separator();
                 paired(ui, "True length".into(), 90.0, |ui, _| {
                     let known = TextEdit::singleline(&mut self.known).hint_text("0.30").desired_width(50.0);
                     ui.add(known).accessible_name("True length in meters");
@@ -188,7 +187,6 @@ impl Ruler {
             MeasuredValue::Area(fit) => {
                 let is_below = self.points.first().is_some_and(|p| fit.normal.dot(eye - *p) < 0.0);
                 let normal = if is_below { -fit.normal } else { fit.normal };
-                ui.separator();
                 if ui.button("Use as the floor").on_hover_text(Action::SetUp(normal).tooltip()).clicked() {
                     cx.ask(Action::SetUp(normal));
                 }
@@ -231,6 +229,11 @@ impl ViewTool for Ruler {
                     scene.measurements.len() > std::mem::replace(&mut self.listed, scene.measurements.len());
                 list(ui, scene.measurements, meters_per_unit(state), is_longer, cx);
             }
+            let uses = self.kind.value(&self.measured(scene, state.semantics.as_ref())).ok();
+            let has_use = |value: &MeasuredValue| matches!(value, MeasuredValue::Length(_) | MeasuredValue::Area(_));
+            if let Some(value) = uses.filter(|value| has_use(value) && (has_room || !is_folded)) {
+                ui.horizontal_wrapped(|ui| self.uses(ui, &value, scene.eye.center, cx));
+            }
             self.kinds(ui, cx);
             let value = self.kind.value(&self.measured(scene, state.semantics.as_ref()));
             ui.horizontal_wrapped(|ui| {
@@ -252,9 +255,6 @@ impl ViewTool for Ruler {
                 }
                 if ui.add_enabled(has_points, Button::new("Clear")).clicked() {
                     (self.points, self.waiting) = (Vec::new(), Vec::new());
-                }
-                if let Some(value) = value.as_ref().ok().filter(|_| has_room || !is_folded) {
-                    self.uses(ui, value, scene.eye.center, cx);
                 }
             });
         });
