@@ -75,10 +75,10 @@ fn hint(ui: &Ui, width: f32) -> &'static str {
     const MARGINS: f32 = 10.0;
     let font = TextStyle::Body.resolve(ui.style());
     let fits = |hint: &&&str| {
-        let galley = ui.painter().layout_no_wrap((**hint).to_string(), font.clone(), Color32::WHITE);
+        let galley = ui.painter().layout_no_wrap((**hint).to_owned(), font.clone(), Color32::WHITE);
         galley.size().x <= width - MARGINS
     };
-    HINTS.iter().find(fits).unwrap_or(&HINTS[HINTS.len() - 1])
+    HINTS.iter().find(fits).or(HINTS.last()).copied().unwrap_or_default()
 }
 
 /// Draws buttons of the completions, unless the first is already typed.

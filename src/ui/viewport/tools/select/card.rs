@@ -158,8 +158,8 @@ fn status(tool: &SelectTool, ui: &mut Ui, scene: &ToolScene<'_>, cx: &Ctx<'_>) {
     let all = cx.state.semantics.as_ref().map(|map| &map.identities);
     if let Some((all, taken)) = all.zip(tool.taken_object()) {
         let text = taken.text(&cx.state.labels.full_name(all, taken.from));
-        let label = Label::new(RichText::new(&text).color(theme::warning())).truncate();
-        ui.add(label).on_hover_text(text);
+        // What is cut is told on hover.
+        ui.add(Label::new(RichText::new(text).color(theme::warning())).truncate());
     }
 }
 
