@@ -154,7 +154,8 @@ pub(super) fn after(
         found.extend(predicate(g, noun, [i, at, j], not));
     } else if noun.is_any() && colors::row(g.words[at]).is_some() {
         // "Everything red". In "all red things", the things that follow are no others.
-        found.extend(colored(g, noun, [i, at, j], not));
+        let read = if g.words[k - 1] == "all" { colored } else { predicate };
+        found.extend(read(g, noun, [i, at, j], not));
     }
     found
 }
