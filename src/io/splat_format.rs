@@ -81,7 +81,7 @@ impl SplatFormat {
             Self::Ply => "Read by every viewer and editor of Gaussians.",
             Self::CompressedPly => "PlayCanvas and SuperSplat. Quick to load.",
             Self::Spz => "Niantic and Scaniverse. Small, for phones and the web.",
-            Self::Sog => "PlayCanvas. The smallest, for the web; slow to write.",
+            Self::Sog => "PlayCanvas. Small, for the web; slow to write.",
             Self::SogFolder => "The same as SOG, as pictures in a folder.",
             Self::Splat => "The first viewers on the web.",
             Self::Glb => "glTF with KHR_gaussian_splatting, in one file.",
@@ -114,9 +114,14 @@ impl SplatFormat {
         if self == Self::Splat && cloud.sh_degree > 0 {
             all.push("view-dependent color".to_owned());
         }
-        if !floats && !cloud.extras.is_empty() {
-            let names: Vec<&str> = cloud.extras.iter().map(|e| e.name.as_str()).collect();
-            all.push(format!("the properties {}", names.join(", ")));
+        let extras = cloud.extras.iter().map(|e| e.name.as_str()).filter(|_| !floats);
+        // The program's own properties say which Gaussians belong to what.
+        let (own, others): (Vec<&str>, Vec<&str>) = extras.partition(|name| name.starts_with("fmlgs_"));
+        if !own.is_empty() {
+            all.push("objects and parts".to_owned());
+        }
+        if !others.is_empty() {
+            all.push(format!("the properties {}", others.join(", ")));
         }
         let mode = match (self, cloud.render_mode) {
             (_, SplatRenderMode::Plain) | (Self::Ply | Self::CompressedPly | Self::Sog | Self::SogFolder, _) => None,

@@ -147,7 +147,7 @@ pub(crate) fn summary(name: &str, report: &RemovalReport) -> String {
         Some(rough) => {
             let surfaces = format::things(report.surfaces.len(), "surface");
             text += &format!(" Filled {surfaces} ({} new)", format::things(report.invented(), "Gaussian"));
-            text += if report.brightened > 0 { " and its shadow." } else { "." };
+            text += if report.brightened > 0 { ", brightened its shadow." } else { "." };
             if rough > ROUGH {
                 text += " A guess: the surroundings are not flat.";
             }

@@ -69,6 +69,17 @@ pub(crate) fn shortened(text: &str, most: usize) -> Cow<'_, str> {
     Cow::Owned(format!("{}\u{2026}", &text[..end]))
 }
 
+/// [`shortened`], of which the last word is whole, if any word is.
+pub(crate) fn shortened_at_word(text: &str, most: usize) -> Cow<'_, str> {
+    let Cow::Owned(cut) = shortened(text, most) else { return Cow::Borrowed(text) };
+    let kept = cut.trim_end_matches('\u{2026}');
+    // A word that ends just there is whole.
+    let is_whole = text[kept.len()..].starts_with(char::is_whitespace);
+    let end = if is_whole { kept.len() } else { kept.rfind(char::is_whitespace).unwrap_or(0) };
+    let kept = kept[..end].trim_end_matches(|c: char| c.is_whitespace() || ",;\u{b7}".contains(c));
+    Cow::Owned(if kept.is_empty() { cut } else { format!("{kept}\u{2026}") })
+}
+
 /// A text on one line, cut in the middle so that it has at most `most` letters.
 pub(crate) fn elided(text: &str, most: usize) -> String {
     let text = &*line(text);
@@ -79,6 +90,23 @@ pub(crate) fn elided(text: &str, most: usize) -> String {
     let keep = most.saturating_sub(1);
     let (head, tail) = (keep / 2, keep - keep / 2);
     text.chars().take(head).chain(['\u{2026}']).chain(text.chars().skip(n - tail)).collect()
+}
+
+/// A file's name, cut so that it has at most `most` letters: without its ending if that suffices, else in the middle.
+/// Most of what stays is at the end, where names of photos differ.
+pub(crate) fn elided_file(name: &str, most: usize) -> String {
+    let name = &*line(name);
+    let n = |text: &str| text.chars().count();
+    if n(name) <= most {
+        return name.to_owned();
+    }
+    let stem = name.rsplit_once('.').map_or(name, |(stem, _)| stem);
+    if stem.is_empty() || n(stem) <= most {
+        return if stem.is_empty() { elided(name, most) } else { stem.to_owned() };
+    }
+    let keep = most.saturating_sub(1);
+    let head = keep / 4;
+    stem.chars().take(head).chain(['\u{2026}']).chain(stem.chars().skip(n(stem) - (keep - head))).collect()
 }
 
 /// A word as a shell takes it: quoted where it would mean more than itself.
@@ -185,8 +213,24 @@ mod tests {
             ("abc".into(), "ab\u{2026}".into(), "\u{2026}".into())
         );
         assert_eq!(name("  kettle \n"), "kettle");
+        let said = "button a, button b and start button";
+        assert_eq!(shortened(said, 32), "button a, button b and start bu\u{2026}", "the control");
+        assert_eq!(shortened_at_word(said, 32), "button a, button b and start\u{2026}");
+        assert_eq!(shortened_at_word(said, 11), "button a\u{2026}", "no comma before the ellipsis");
+        assert_eq!(shortened_at_word(said, 19), "button a, button b\u{2026}", "a word that just fits");
+        assert_eq!((shortened_at_word(said, 35), shortened_at_word("abcdef", 4)), (said.into(), "abc\u{2026}".into()));
         assert_eq!(elided("short", 10), "short");
         assert_eq!(["/a/b-1.ply", "", "/my scene/it's"].map(shell_word), ["/a/b-1.ply", "''", r"'/my scene/it'\''s'"]);
         assert_eq!(elided("a/very/long/path/to/a/file.ply", 12), "a/ver\u{2026}le.ply");
+    }
+
+    #[test]
+    fn names_of_photos_are_told_apart_when_they_are_cut() {
+        let photos = ["20240215_143919.png", "20240215_143920.png"];
+        assert_eq!(elided(photos[0], 9), elided(photos[1], 9), "the control");
+        assert_eq!(photos.map(|photo| elided_file(photo, 9)), ["20\u{2026}143919", "20\u{2026}143920"]);
+        assert_eq!(elided_file(photos[0], 15), "20240215_143919", "the ending goes first");
+        assert_eq!((elided_file("0001.png", 9), elided_file("a.b", 1)), ("0001.png".into(), "a".into()));
+        assert_eq!(elided_file(".hidden_photo", 6).chars().count(), 6);
     }
 }

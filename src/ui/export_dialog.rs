@@ -1,4 +1,4 @@
-//! The dialog before Gaussians are saved: what is exported and in which format, with the size and the loss of each.
+//! The dialog before Gaussians are saved: what is exported and in which format, with the size and the fidelity of each.
 
 use std::sync::Arc;
 
@@ -16,7 +16,7 @@ use crate::worker::{JobInfo, Task, Tasks};
 
 /// Widths of the columns at the right, points.
 const SIZE_PT: f32 = 110.0;
-const LOSS_PT: f32 = 90.0;
+const FIDELITY_PT: f32 = 90.0;
 
 /// Gaussians that are exported.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -107,7 +107,7 @@ impl ExportDialog {
             ui.heading("Export Gaussians");
             ui.add_space(4.0);
             let changed = self.scopes(ui);
-            columns(ui, |ui| ui.weak("Format"), "Size", "Loss (PSNR)", theme::weak());
+            columns(ui, |ui| ui.weak("Format"), "Size", "Fidelity (PSNR)", theme::weak());
             let list_pt = (room.y - 250.0).clamp(120.0, 400.0);
             ScrollArea::vertical().max_height(list_pt).min_scrolled_height(list_pt).show(ui, |ui| self.formats(ui));
             ui.add_space(4.0);
@@ -159,20 +159,20 @@ impl ExportDialog {
         for &format in SplatFormat::VARIANTS {
             let found = self.forecasts.iter().find(|one| one.format == format).map(|one| &one.written);
             let waiting = if self.task.is_some() { "\u{2026}" } else { "\u{2013}" };
-            let (size, loss) = match found {
+            let (size, fidelity) = match found {
                 None => (waiting.to_owned(), waiting.to_owned()),
                 Some(Err(_)) => ("\u{2013}".to_owned(), "\u{2013}".to_owned()),
                 Some(Ok(written)) => {
                     let bytes = size_text(written.bytes);
                     let size = if self.is_sampled() { format!("about {bytes}") } else { bytes };
-                    let loss = written.drawn.map_or_else(
+                    let fidelity = written.drawn.map_or_else(
                         || "\u{2013}".to_owned(),
                         |drawn| match drawn.psnr {
                             Some(db) => format::decibel(db),
-                            None => "none".to_owned(),
+                            None => "exact".to_owned(),
                         },
                     );
-                    (size, loss)
+                    (size, fidelity)
                 }
             };
             let can_write = !matches!(found, Some(Err(_)));
@@ -184,10 +184,10 @@ impl ExportDialog {
                 if self.format == format && std::mem::take(&mut self.follows) {
                     radio.scroll_to_me(None);
                 }
-                let values = format!("{}: size {size}, loss {loss}", format.title());
+                let values = format!("{}: size {size}, fidelity {fidelity}", format.title());
                 radio.on_hover_text(format.rounding().map_or_else(|| values.clone(), |r| format!("Rounded: {r}.")))
             };
-            columns(ui, name, &size, &loss, theme::text());
+            columns(ui, name, &size, &fidelity, theme::text());
             ui.indent(format.title(), |ui| {
                 let mut about = format.about().to_owned();
                 match found {
@@ -210,12 +210,12 @@ impl ExportDialog {
         }
     }
 
-    /// True if sizes and losses are those of some of the Gaussians.
+    /// True if sizes and fidelity are those of some of the Gaussians.
     fn is_sampled(&self) -> bool {
         self.cloud.len() > export_forecast::MOST
     }
 
-    /// Sentence on how sizes and losses were found.
+    /// Sentence on how sizes and fidelity were found.
     fn basis(&self) -> String {
         if self.task.is_none() {
             return "Not measured: too many jobs wait.".into();
@@ -224,9 +224,9 @@ impl ExportDialog {
         match self.is_sampled() {
             true => {
                 let [some, all] = [export_forecast::MOST, self.cloud.len()].map(|n| format::count(n as u64));
-                format!("Sizes and losses are estimated on {some} of {all} Gaussians. Loss: {views}.")
+                format!("Sizes and fidelity are estimated on {some} of {all} Gaussians. Fidelity: {views}.")
             }
-            false => format!("Loss: {views}."),
+            false => format!("Fidelity: {views}."),
         }
     }
 }
@@ -244,19 +244,18 @@ fn size_text(bytes: u64) -> String {
 fn short(what: &str) -> String {
     let names = what.strip_prefix("the properties ").map(|names| names.split(", ").collect::<Vec<_>>());
     match names.as_deref() {
-        Some(names) if names.iter().all(|name| name.starts_with("fmlgs_")) => "objects and parts".to_owned(),
         Some([first, rest @ ..]) if rest.len() > 1 => format!("{} properties ({first}, \u{2026})", rest.len() + 1),
         _ => what.to_owned(),
     }
 }
 
 /// A row of the list: a name, and two values at the right.
-fn columns<T>(ui: &mut Ui, name: impl FnOnce(&mut Ui) -> T, size: &str, loss: &str, color: egui::Color32) {
+fn columns<T>(ui: &mut Ui, name: impl FnOnce(&mut Ui) -> T, size: &str, fidelity: &str, color: egui::Color32) {
     ui.horizontal(|ui| {
         name(ui);
         ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
             ui.add_space(12.0);
-            for (text, width) in [(loss, LOSS_PT), (size, SIZE_PT)] {
+            for (text, width) in [(fidelity, FIDELITY_PT), (size, SIZE_PT)] {
                 let place = Layout::right_to_left(Align::Center);
                 ui.allocate_ui_with_layout(vec2(width, ui.available_height()), place, |ui| {
                     ui.set_min_width(width);
@@ -277,8 +276,6 @@ mod tests {
             [999, 1_280, 123_456, 1_440_000, 1_360_000, 123_000_000].map(size_text),
             ["999 B", "1.3 kB", "123 kB", "1.4 MB", "1.4 MB", "123 MB"]
         );
-        assert_eq!(short("the properties fmlgs_identity, fmlgs_margin"), "objects and parts");
-        assert_eq!(short("the properties fmlgs_identity, b, c"), "3 properties (fmlgs_identity, \u{2026})");
         assert_eq!(short("the properties a, b, c"), "3 properties (a, \u{2026})");
         assert_eq!(["the properties a, b", "flag of surfels"].map(short), ["the properties a, b", "flag of surfels"]);
     }

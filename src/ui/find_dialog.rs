@@ -1,4 +1,4 @@
-//! Choice of the models that find objects if photos have no labels: the abilities, costs and downloads of each.
+//! Choice of the models that find objects if photos have no masks: the abilities, costs and downloads of each.
 
 use std::collections::VecDeque;
 
@@ -72,7 +72,7 @@ impl FindDialog {
             ui.set_width((room.x - 80.0).min(600.0));
             ui.heading("Find objects and parts");
             ui.add_space(4.0);
-            let text = "These photos have no labels. The segmenter decides which objects are found, the text encoder \
+            let text = "These photos have no masks. The segmenter decides which objects are found, the text encoder \
                         which words find them.";
             ui.label(RichText::new(text).color(theme::weak()));
             let Some(known) = &state.models else {

@@ -27,6 +27,11 @@ impl ScreenNames {
         self.instead(all, id).map_or_else(|| all.label(id), str::to_owned)
     }
 
+    /// Label in the list of objects, which is narrow: "kettle" or "pale blue, 12 cm".
+    pub(crate) fn name_in_list(&self, all: &Identities, id: IdentityId) -> String {
+        self.instead(all, id).map_or_else(|| all.label(id), |text| text.replacen(" region, ", ", ", 1))
+    }
+
     /// Label with the whole, such as "lid · kettle" or "pale blue region, 12 cm".
     pub(crate) fn full_name(&self, all: &Identities, id: IdentityId) -> String {
         self.instead(all, id).map_or_else(|| all.full_name(id), str::to_owned)
@@ -94,8 +99,10 @@ mod tests {
         let part = all.add(Level::Part, region, vec![]);
         let labels = ScreenNames(vec![Some("red region, 2 cm".into()), None]);
         assert_eq!(labels.name(&all, region), "red region, 2 cm");
+        assert_eq!(labels.name_in_list(&all, region), "red, 2 cm");
         assert_eq!((labels.name(&all, part), labels.full_name(&all, part)), ("#2".into(), "#2 · #1".into()));
         all.rename(region, "apple");
+        assert_eq!(labels.name_in_list(&all, region), "apple", "the control");
         assert_eq!((labels.name(&all, region), labels.full_name(&all, part)), ("apple".into(), "#2 · apple".into()));
         assert_eq!(labels.name(&all, NO_IDENTITY), "nothing");
     }

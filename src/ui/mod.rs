@@ -33,6 +33,7 @@ pub(crate) mod layout;
 mod main_button;
 pub(crate) mod next_step;
 mod object_menu;
+mod paired;
 pub(crate) mod palette;
 pub(crate) mod panes;
 pub mod select_shape;

@@ -316,6 +316,12 @@ pub(crate) fn card<T>(ctx: &egui::Context, area: Area, add: impl FnOnce(&mut Ui)
     in_window_theme(ctx, || area.show(ctx, |ui| overlay().show(ui, add).inner))
 }
 
+/// A card as [`card`], which in a small view lies over others: they do not shine through.
+pub(crate) fn solid_card<T>(ctx: &egui::Context, area: Area, add: impl FnOnce(&mut Ui) -> T) -> InnerResponse<T> {
+    let frame = || overlay().fill(COLORS.get().overlay.to_opaque());
+    in_window_theme(ctx, || area.show(ctx, |ui| frame().show(ui, add).inner))
+}
+
 /// UV rectangle of the centered part of an image that fills a place.
 pub(crate) fn filling(picture: egui::Vec2, place: egui::Vec2) -> egui::Rect {
     let scale = (place.x / picture.x.max(1.0)).max(place.y / picture.y.max(1.0));

@@ -132,12 +132,12 @@ fn open_by(
 fn replace_scene(app: &mut App, open: impl FnOnce(&mut App) + 'static) {
     // A job on another computer continues there.
     let running = app.state.job.as_ref().filter(|job| !remote::is_remote(job.id));
-    let running = running.map(|job| format!("{} is still running. Cancel it? {}", job.info.title, job.leaves()));
+    let running = running.map(|job| format!("{} is still running. Stop it? {}", job.info.title, job.leaves()));
     let Some(text) = running else {
         remote::disconnect(app);
         return open(app);
     };
-    let question = Question { text, yes: "Cancel and continue", other: None, no: "Keep running", deletes: false };
+    let question = Question { text, yes: "Stop and continue", other: None, no: "Keep running", deletes: false };
     app.put_question(question, |app, answer| {
         if answer == DialogAnswer::Yes {
             remote::cancel_job(app);

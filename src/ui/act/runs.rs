@@ -34,7 +34,7 @@ pub(in crate::ui) fn rename(app: &mut App, run: PathBuf, name: String) {
 pub(in crate::ui) fn ask_to_delete(app: &mut App, run: PathBuf) {
     let is_open = app.state.scene.as_ref().is_some_and(|s| s.out == run);
     if is_open && (app.state.job.is_some() || app.is_editing()) {
-        let text = "This training is being worked on; cancel that first (Esc).";
+        let text = "This training is being worked on; stop that first (Esc).";
         return app.state.toast(Tone::Warning, text);
     }
     let known = app.state.scene.as_ref().and_then(|s| s.runs.iter().find(|known| known.folder == run));
@@ -67,7 +67,7 @@ pub(super) fn ask_to_delete_open(app: &mut App) {
         return ask_to_delete(app, run);
     }
     if app.state.job.is_some() || app.is_editing() {
-        return app.state.toast(Tone::Warning, "This scene is being worked on; cancel that first (Esc).");
+        return app.state.toast(Tone::Warning, "This scene is being worked on; stop that first (Esc).");
     }
     let (folder, name) = (scene.out.clone(), &scene.name);
     let text = format!(

@@ -25,7 +25,7 @@ pub(in crate::ui) fn start(app: &mut App, anew: bool, if_changed: IfChanged) {
         return app.state.toast(Tone::Warning, text);
     };
     if let Some(job) = &app.state.job {
-        let text = format!("{} is still running; cancel it first (Esc).", job.info.title);
+        let text = format!("{} is still running; stop it first (Esc).", job.info.title);
         return app.state.toast(Tone::Warning, text);
     }
     let title = format!("Training {}", dataset.name);
@@ -111,7 +111,7 @@ pub(in crate::ui) fn benchmark_rendering(app: &mut App) {
     };
     if let Some(job) = &app.state.job {
         let title = &job.info.title;
-        let text = format!("{title} is still running and would distort the times; cancel it first (Esc).");
+        let text = format!("{title} is still running and would distort the times; stop it first (Esc).");
         return app.state.toast(Tone::Warning, text);
     }
     let subject = Subject {

@@ -144,8 +144,8 @@ pub(in crate::ui) fn dismiss(app: &mut App, ctx: &Context) {
     } else if app.full_view {
         window::fill(app, ctx);
     } else if let Some(job) = app.state.job.as_ref().filter(|job| !job.canceling) {
-        let text = format!("Cancel \u{201c}{}\u{201d}? {}", job.info.title, job.leaves());
-        let question = Question { text, yes: "Cancel it", other: None, no: "Keep running", deletes: false };
+        let text = job.stop_question();
+        let question = Question { text, yes: "Stop", other: None, no: "Keep running", deletes: false };
         app.put_question(question, |app, answer| {
             if answer == DialogAnswer::Yes {
                 remote::cancel_job(app);

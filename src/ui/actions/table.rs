@@ -51,9 +51,9 @@ macro_rules! action_table {
                 => train::start(app, true, IfChanged::Ask);
             PauseJob: "Pause or resume the running job", "Training, a search for objects, a download: it waits and loses nothing.", "T"
                 => train::pause(app);
-            Cancel: "Cancel the running job", "Stop the running job at its next step. Progress so far is kept."
+            Cancel: "Stop the running job", "Cancel it at its next step. Progress so far is kept."
                 => remote::cancel_job(app);
-            Dismiss: "Deselect, or cancel the running job", "Deselect what is selected; with nothing selected, ask whether to stop the running job.",
+            Dismiss: "Deselect, or stop the running job", "Deselect what is selected; with nothing selected, ask whether to stop the running job.",
                 "Escape" => view::dismiss(app, ctx);
             Evaluate: "Evaluate on held-out photos", "PSNR and SSIM on photos held out from training."
                 => train::evaluate(app);

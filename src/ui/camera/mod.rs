@@ -24,6 +24,7 @@ use crate::navigate::camera_spline::{MOST_PICTURES, steps_of};
 use crate::navigate::{CameraSpline, CameraTrajectory, Pose, Speed};
 use crate::scene::{Camera, CameraPath, PathKey};
 use crate::ui::actions::Action;
+use crate::ui::paired::paired;
 
 /// The camera path under edit, and its playback.
 pub(crate) struct CameraPane {
@@ -308,9 +309,8 @@ impl CameraPane {
             }
         }
         let has_keys = !self.path.keys.is_empty();
-        let duration = ui.label("Duration").id;
         let seconds = DragValue::new(&mut self.path.seconds).range(0.1..=3600.0).speed(0.05).suffix(" s");
-        ui.add_enabled(has_keys, seconds).labelled_by(duration);
+        paired(ui, "Duration".into(), 80.0, |ui, label| ui.add_enabled(has_keys, seconds).labelled_by(label));
         ui.add_enabled(has_keys, Checkbox::new(&mut self.path.closed, "Closed loop"))
             .on_hover_text("Continue from the last keyframe to the first.");
         let mut eased = self.speed == Speed::Eased;

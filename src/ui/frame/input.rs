@@ -29,13 +29,12 @@ pub(super) fn take(app: &mut App, ctx: &Context) {
     }
     query::follow_vain_query(app, ctx);
     if !app.palette.is_open() && !has_dialog && !app.sheet && app.help.is_none() && !has_menu {
-        // While something is measured, Enter keeps it.
-        let keeps = !keys::is_typing(ctx) && app.viewport.is_measuring();
-        if keeps
-            && ctx.memory(|m| m.focused()).is_none()
+        // Enter keeps what is measured, and applies what is moved.
+        let is_free = !keys::is_typing(ctx) && ctx.memory(|m| m.focused()).is_none();
+        if let Some(entered) = app.viewport.on_enter().filter(|_| is_free)
             && ctx.input_mut(|i| i.consume_key(Modifiers::NONE, Key::Enter))
         {
-            app.actions.push(Action::KeepMeasurement);
+            app.actions.push(entered);
         }
         for action in keys::pressed(ctx) {
             // Without a scene there is nothing to talk about.

@@ -59,10 +59,12 @@ fn take_news(app: &mut App, ctx: &egui::Context) {
         app.traced += 1;
         app.state.say_at(Some(load.at_secs), Tone::Info, load.text());
     }
-    // New objects are the next thing to work with, so their pane comes to the front.
+    // New objects are the next thing to work with, so their pane comes to the front. Those that came along with a
+    // training are not: its plot is looked at.
     let has_objects = app.state.semantics.is_some();
     let news = if has_objects { Pane::Objects } else { Pane::Training };
-    if std::mem::replace(&mut app.had_objects, has_objects) != has_objects && app.layout.shows(news) {
+    let is_news = std::mem::replace(&mut app.had_objects, has_objects) != has_objects;
+    if is_news && !(has_objects && app.state.has_carried_objects) && app.layout.shows(news) {
         app.layout.dock.activate(news);
     }
     app.viewport.update(&mut app.state, &app.tasks);

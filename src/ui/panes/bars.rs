@@ -298,7 +298,7 @@ fn job_buttons(ui: &mut Ui, job: &RunningJob, cx: &mut Ctx<'_>) {
             cx.ask(Action::PauseJob);
         }
     }
-    if ui.small_button("Cancel").on_hover_text("Esc").clicked() {
+    if ui.small_button("Stop").accessible_name(Action::Cancel.text()).on_hover_text("Esc").clicked() {
         cx.ask(Action::Cancel);
     }
 }

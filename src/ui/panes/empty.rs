@@ -295,7 +295,8 @@ fn busy(ui: &mut Ui, job: &RunningJob, cx: &mut Ctx<'_>) {
             ui.label(RichText::new(job.info.hint).color(theme::weak()));
         }
         ui.add_space(14.0);
-        if ui.add(Button::new("Cancel").min_size(vec2(110.0, 30.0))).clicked() {
+        let button = ui.add(Button::new("Stop").min_size(vec2(110.0, 30.0)));
+        if button.accessible_name(Action::Cancel.text()).clicked() {
             cx.ask(Action::Cancel);
         }
     });

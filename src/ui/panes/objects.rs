@@ -18,6 +18,7 @@ use crate::math::format::things;
 use crate::pipeline::semantics::lifting::edit::Edit;
 use crate::scene::{Identities, IdentityId, NO_IDENTITY};
 use crate::ui::actions::Action;
+use crate::worker::Makes;
 
 /// Side of a thumbnail, points.
 const THUMBNAIL_PX: f32 = 30.0;
@@ -202,12 +203,17 @@ impl Tree<'_> {
             return self.name_field(ui, cx);
         }
         let is_selected = self.selected == Some(id);
-        let name = Button::new(self.labels.name(self.identities, id)).selected(is_selected).truncate();
+        let name = Button::new(self.labels.name_in_list(self.identities, id)).selected(is_selected).truncate();
         let name = ui.add(name.frame_when_inactive(is_selected));
         if self.scroll_to == Some(id) {
             name.scroll_to_me(Some(Align::Center));
         }
         let name = name.on_hover_ui(|ui| {
+            let [full, listed] =
+                [ScreenNames::name, ScreenNames::name_in_list].map(|of| of(self.labels, self.identities, id));
+            if full != listed {
+                ui.strong(full);
+            }
             ui.label("Select it and highlight it in the view; double-click to rename it");
             self.facts.line(id).into_iter().for_each(|line| drop(ui.weak(line)));
         });
@@ -270,8 +276,9 @@ fn show_how_to_begin(ui: &mut Ui, cx: &mut Ctx<'_>) {
     let idle = state.job.is_none() && state.is_trained();
     let why = if state.is_trained() { "Another job is running." } else { "Train the scene first." };
     let button = |text: &str| Button::new(text.to_owned()).min_size(vec2(170.0, 28.0));
-    if !has_masks {
-        let text = "The photos have no labels: choose the models that find objects.";
+    let finds = state.job.as_ref().is_some_and(|job| job.info.makes == Makes::Objects);
+    if !has_masks && !finds {
+        let text = "These photos have no masks: choose some, or a network that finds objects.";
         ui.label(RichText::new(text).color(theme::weak()));
     }
     let action = Action::FindObjects;

@@ -116,7 +116,7 @@ impl PhotosPane {
         let file = caption.name.rsplit('/').next().unwrap_or(caption.name);
         let color = if caption.held { theme::warning() } else { theme::weak() };
         let room = if caption.psnr.is_some() { 9 } else { 16 };
-        text(ui, pos2(rect.left() + 2.0, y), egui::Align2::LEFT_CENTER, &text::elided(file, room), color);
+        text(ui, pos2(rect.left() + 2.0, y), egui::Align2::LEFT_CENTER, &text::elided_file(file, room), color);
         if let Some(psnr) = caption.psnr {
             text(ui, pos2(rect.right() - 2.0, y), egui::Align2::RIGHT_CENTER, &format!("{psnr:.1} dB"), theme::text());
         }

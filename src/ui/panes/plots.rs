@@ -1,9 +1,10 @@
 //! The plot of training: PSNR or loss against seconds or steps.
 
-use egui::{Slider, Ui, Vec2b};
-use egui_plot::{GridMark, HoverPosition, Legend, Line, LineStyle, MarkerShape, Plot, PlotPoints, Points};
+use egui::{Color32, RichText, Sense, Shape, Slider, Stroke, Ui, Vec2b, vec2};
+use egui_plot::{GridMark, HoverPosition, Line, LineStyle, MarkerShape, Plot, PlotPoints, Points};
 
 use super::super::layout::{PlotAxis, PlotQuantity, PlotSettings};
+use super::super::paired::paired;
 use super::super::state::TrainHistory;
 use super::super::theme;
 use crate::math::format;
@@ -14,6 +15,8 @@ use crate::pipeline::observer::{Evaluation, StepMetrics};
 const Y_AXIS_PT: f32 = 34.0;
 /// Least distance of the numbers of the horizontal axis, points.
 const MARK_PT: f64 = 80.0;
+/// Length of a line beside its name, points.
+const SIGN_PT: f32 = 18.0;
 /// Width of a letter of an axis, points.
 const LETTER_PT: f64 = 8.0;
 
@@ -37,8 +40,10 @@ pub(crate) fn show(
         });
     });
     ui.horizontal_wrapped(|ui| {
-        let id = ui.label("Smoothing").id;
-        ui.add(Slider::new(&mut settings.smoothing, 0.0..=20.0).suffix(" %").fixed_decimals(0)).labelled_by(id);
+        paired(ui, "Smoothing".into(), 180.0, |ui, label| {
+            let smoothing = Slider::new(&mut settings.smoothing, 0.0..=20.0).suffix(" %").fixed_decimals(0);
+            ui.add(smoothing).labelled_by(label);
+        });
         if settings.quantity == PlotQuantity::Loss {
             ui.checkbox(&mut settings.log, "Log scale");
             ui.weak("L1 + 0.2 D-SSIM");
@@ -75,34 +80,59 @@ pub(crate) fn show(
         loss_plot.response.accessible_name("Plot of the loss");
         return;
     }
-    let psnr_plot = plot(ui, "psnr", "PSNR (dB)", *axis)
-        .legend(Legend::default().position(egui_plot::Corner::RightBottom).background_alpha(0.5))
-        .show(ui, |p| {
-            let colors = [theme::warning(), theme::good()].into_iter().cycle();
-            for ((name, curve), color) in curves.iter().zip(colors).filter(|_| over_secs) {
-                p.line(Line::new(name.clone(), PlotPoints::from(curve.clone())).color(color).width(1.2));
-            }
-            if before {
-                p.line(dashed("training photos (previous run)", &psnr(previous)));
-                let held = PlotPoints::from(held(previous));
-                p.line(
-                    Line::new("held-out photos (previous run)", held)
-                        .color(theme::warning())
-                        .width(1.4)
-                        .style(LineStyle::dashed_loose()),
-                );
-            }
-            let held = held(history);
-            p.line(Line::new("training photos", smooth(&psnr(history))).color(theme::weak()).width(1.2));
-            p.line(Line::new("held-out photos", PlotPoints::from(held.clone())).color(theme::accent()).width(2.0));
-            p.points(
-                Points::new("held-out photos", PlotPoints::from(held))
-                    .shape(MarkerShape::Circle)
-                    .radius(3.0)
-                    .color(theme::accent()),
+    let colors = [theme::warning(), theme::good()].into_iter().cycle();
+    let curves = || curves.iter().zip(colors.clone()).filter(|_| over_secs);
+    let mut named: Vec<(&str, Color32, bool)> = curves().map(|((name, _), color)| (&**name, color, false)).collect();
+    named.extend([("training photos", theme::weak(), false), ("held-out photos", theme::accent(), false)]);
+    if before {
+        named.push(("previous run", theme::weak(), true));
+        if !previous.evaluations.is_empty() {
+            named.push(("its held-out photos", theme::warning(), true));
+        }
+    }
+    names(ui, &named);
+    let psnr_plot = plot(ui, "psnr", "PSNR (dB)", *axis).show(ui, |p| {
+        for ((name, curve), color) in curves() {
+            p.line(Line::new(name.clone(), PlotPoints::from(curve.clone())).color(color).width(1.2));
+        }
+        if before {
+            p.line(dashed("training photos (previous run)", &psnr(previous)));
+            let held = PlotPoints::from(held(previous));
+            p.line(
+                Line::new("held-out photos (previous run)", held)
+                    .color(theme::warning())
+                    .width(1.4)
+                    .style(LineStyle::dashed_loose()),
             );
-        });
+        }
+        let held = held(history);
+        p.line(Line::new("training photos", smooth(&psnr(history))).color(theme::weak()).width(1.2));
+        p.line(Line::new("held-out photos", PlotPoints::from(held.clone())).color(theme::accent()).width(2.0));
+        p.points(
+            Points::new("held-out photos", PlotPoints::from(held))
+                .shape(MarkerShape::Circle)
+                .radius(3.0)
+                .color(theme::accent()),
+        );
+    });
     psnr_plot.response.accessible_name("Plot of PSNR");
+}
+
+/// Draws the names of lines, each with its color and whether it is dashed, above the plot, where they cover nothing.
+fn names(ui: &mut Ui, lines: &[(&str, Color32, bool)]) {
+    ui.horizontal_wrapped(|ui| {
+        for (name, color, is_dashed) in lines {
+            paired(ui, RichText::new(*name).small().color(theme::weak()), SIGN_PT, |ui, _| {
+                let (rect, _) = ui.allocate_exact_size(vec2(SIGN_PT, 8.0), Sense::hover());
+                let (ends, stroke) = ([rect.left_center(), rect.right_center()], Stroke::new(2.0, *color));
+                if *is_dashed {
+                    ui.painter().extend(Shape::dashed_line(&ends, stroke, 4.0, 3.0));
+                } else {
+                    ui.painter().line_segment(ends, stroke);
+                }
+            });
+        }
+    });
 }
 
 fn plot(ui: &Ui, name: &'static str, quantity: &'static str, axis: PlotAxis) -> Plot<'static> {

@@ -237,9 +237,10 @@ fn running(ui: &mut Ui, job: &RunningJob, cx: &mut Ctx<'_>) {
         if ui.add(button.min_size(size)).on_hover_text(tip).clicked() {
             cx.ask(Action::PauseJob);
         }
-        let tip = format!("{}  Esc", Action::Cancel.tooltip());
-        if ui.add(egui::Button::new("Cancel").min_size(size)).on_hover_text(tip).clicked() {
-            cx.ask(Action::Cancel);
+        let stop = Action::Cancel;
+        let button = ui.add(egui::Button::new("Stop").min_size(size)).accessible_name(stop.text());
+        if button.on_hover_text(format!("{}  Esc", stop.tooltip())).clicked() {
+            cx.ask(stop);
         }
     });
 }

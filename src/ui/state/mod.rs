@@ -60,6 +60,8 @@ pub struct AppState {
     pub(crate) antialias: bool,
     /// Objects and parts of the Gaussians on screen.
     pub semantics: Option<Versioned<SemanticMap>>,
+    /// True if they are those of the training before, and no news.
+    pub(crate) has_carried_objects: bool,
     /// Evidence on each of them by number, parts included; their Gaussians; and their labels on screen.
     pub(crate) facts: Vec<IdentityEvidence>,
     pub(crate) sizes: Vec<usize>,
@@ -173,7 +175,7 @@ impl AppState {
                 if let Some(long) = long {
                     let reached = long.progress.filter(|_| long.info.makes == Makes::Gaussians).map(|p| p.done);
                     self.resumable.iter_mut().zip(reached).for_each(|((_, step), reached)| *step = reached);
-                    self.toast(Tone::Info, format!("{}: canceled", long.info.title));
+                    self.toast(Tone::Info, format!("{}: stopped", long.info.title));
                 }
             }
             JobEnd::Failed(failure) => {
@@ -240,6 +242,7 @@ impl AppState {
         self.sizes = self.facts.iter().map(|f| f.gaussians).collect();
         self.set_facts(self.plan.facts.clone().with_semantics(map.as_deref()));
         self.semantics = map.map(Versioned::new);
+        self.has_carried_objects = false;
     }
 
     /// Shows an opened scene.

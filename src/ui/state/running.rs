@@ -42,19 +42,28 @@ impl RunningJob {
         }
     }
 
-    /// Title, with a note if the job is paused or being canceled.
+    /// Title, with a note if the job is paused or being stopped.
     pub(crate) fn text(&self) -> String {
         match (self.canceling, self.paused) {
-            (true, _) => format!("{}: canceling\u{2026}", self.info.title),
+            (true, _) => format!("{}: stopping\u{2026}", self.info.title),
             (_, true) => format!("{} (paused)", self.info.title),
             _ => self.info.title.clone(),
         }
     }
 
+    /// Question whether to end it now.
+    pub(crate) fn stop_question(&self) -> String {
+        let what = match self.info.makes {
+            Makes::Gaussians => "the training".to_owned(),
+            _ => format!("\u{201c}{}\u{201d}", self.info.title),
+        };
+        format!("Stop {what}? {}", self.leaves())
+    }
+
     /// Sentence on what is left of the job if it is ended now.
     pub(crate) fn leaves(&self) -> &'static str {
         match self.info.makes {
-            Makes::Gaussians => "It goes on from its last checkpoint next time.",
+            Makes::Gaussians => "It is saved, and can be continued.",
             Makes::Objects => "It goes on where it was next time.",
             Makes::Scene | Makes::Nothing => "What it has done so far is discarded.",
         }
@@ -122,6 +131,14 @@ mod tests {
 
     fn at(done: u64, elapsed_secs: f64, rate: f64) -> Progress {
         Progress { stage: "Training".into(), done, total: 3_000, elapsed_secs, rate }
+    }
+
+    #[test]
+    fn the_question_whether_to_stop_says_what_is_left() {
+        let of = |makes| RunningJob::begun(JobId::Local(1), JobInfo::long("Exporting").makes(makes)).stop_question();
+        assert_eq!(of(Makes::Gaussians), "Stop the training? It is saved, and can be continued.");
+        let control = of(Makes::Nothing);
+        assert!(control.starts_with("Stop \u{201c}Exporting\u{201d}?") && control.contains("discarded"), "{control}");
     }
 
     #[test]

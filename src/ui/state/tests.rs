@@ -145,11 +145,32 @@ fn objects_carried_by_masks_are_found_after_training() {
         s.apply(Event::Ended(JOB, JobEnd::Finished));
         let facts = SceneFacts::default();
         let (out, evaluations, runs) = (PathBuf::from("out"), Vec::new(), Vec::new());
-        s.trained(JOB, TrainedRun { evaluations, out, semantics, runs, stopped_at: None, facts })
+        s.training_job = Some(JOB);
+        let finds = s.trained(JOB, TrainedRun { evaluations, out, semantics, runs, stopped_at: None, facts });
+        let carried = s.has_carried_objects;
+        s.set_semantics(Some(Arc::default()));
+        assert!(!s.has_carried_objects, "objects that are found are news");
+        (finds, carried)
     };
-    assert!(end(true, None));
-    assert!(!end(true, Some(Arc::default())), "they came along");
-    assert!(!end(false, None));
+    assert_eq!(end(true, None), (true, false));
+    assert_eq!(end(true, Some(Arc::default())), (false, true), "they came along");
+    assert_eq!(end(false, None), (false, false));
+}
+
+#[test]
+fn a_stopped_training_says_how_far_it_came() {
+    let end = |stopped_at| {
+        let mut s = AppState {
+            resumable: Some((TrainConfig { steps: 150, ..TrainConfig::default() }, 0)),
+            ..AppState::default()
+        };
+        let (facts, runs) = (SceneFacts::default(), Vec::new());
+        let (evaluations, out, semantics) = (Vec::new(), PathBuf::from("out"), None);
+        s.trained(JOB, TrainedRun { evaluations, out, semantics, runs, stopped_at, facts });
+        s.toasts.last().map(|toast| toast.text.clone()).expect("a message")
+    };
+    assert_eq!(end(Some(92)), "Training stopped at step 92 of 150, saved");
+    assert_eq!(end(None), "Training finished", "the control");
 }
 
 #[test]

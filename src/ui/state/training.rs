@@ -80,6 +80,7 @@ impl AppState {
         (self.history, self.previous) = (before.history, before.previous);
         self.resumable = before.resumable;
         self.set_semantics(before.semantics);
+        self.has_carried_objects = true;
         true
     }
 
@@ -91,6 +92,7 @@ impl AppState {
             self.history.evaluations = evaluations;
             self.set_facts(facts);
             self.set_semantics(semantics);
+            self.has_carried_objects = carried;
             self.scene = self.scene.take().map(|s| Arc::new(OpenedScene { runs, ..s.trained_in(&out) }));
             let reached = stopped_at.or(self.history.steps.last().map(|s| s.step));
             self.resumable.iter_mut().zip(reached).for_each(|((_, step), reached)| *step = reached);
@@ -98,9 +100,9 @@ impl AppState {
         let origin = self.scene.as_ref().and_then(|scene| scene.remote.as_ref());
         let host = origin.map_or_else(String::new, |origin| format!(" on {}", origin.host));
         self.say(Tone::Info, format!("Saved to {}{host}", out.display()));
-        if stopped_at.is_some() {
-            let name = self.scene.as_ref().map_or("", |s| &s.name);
-            self.toast(Tone::Info, format!("Training {name}: canceled"));
+        if let Some(step) = stopped_at {
+            let whole = self.resumable.as_ref().map_or_else(String::new, |(config, _)| format!(" of {}", config.steps));
+            self.toast(Tone::Info, format!("Training stopped at step {step}{whole}, saved"));
             return false;
         }
         let quality = self.history.evaluations.last().map(|e| format!(", held-out PSNR {:.2} dB", e.psnr));

@@ -23,7 +23,7 @@ use crate::jobs::select::SelectFor;
 use crate::navigate::Pose;
 use crate::pipeline::semantics::lifting::edit::Edit;
 use crate::scene::{Bounds, CropBox, IdentityId, NO_IDENTITY};
-use crate::ui::actions::Face;
+use crate::ui::actions::{Action, Face};
 use crate::ui::layout::Layout;
 use crate::ui::select_shape::SelectShape;
 use crate::worker::Tasks;
@@ -200,6 +200,15 @@ impl Viewport {
     /// True if the ruler is in use.
     pub(crate) fn is_measuring(&self) -> bool {
         matches!(self.tool, Some(Tool::Ruler(_)))
+    }
+
+    /// What Enter does with the tool in use.
+    pub(crate) fn on_enter(&self) -> Option<Action> {
+        match &self.tool {
+            Some(Tool::Ruler(_)) => Some(Action::KeepMeasurement),
+            Some(Tool::Transform(tool)) if tool.is_something() => Some(Action::ApplyTransform),
+            _ => None,
+        }
     }
 
     /// Keeps what the ruler has measured. Returns false if there is nothing to keep.

@@ -4,9 +4,10 @@
 use std::collections::HashMap;
 use std::sync::Arc;
 
-use egui::{Color32, FontId, Painter, Pos2, Rect, Sense, Shape, Stroke, Ui, Vec2, pos2, vec2};
+use egui::{Color32, FontId, Galley, Painter, Pos2, Rect, Sense, Shape, Stroke, Ui, Vec2, pos2, vec2};
 use glam::DVec3;
 
+use super::apart::labels_apart;
 use super::numbers;
 use super::query::Queries;
 use super::visible::Visibility;
@@ -57,6 +58,16 @@ enum Mark {
     Ring,
 }
 
+/// A mark in the view.
+struct DrawnMark {
+    id: IdentityId,
+    name: String,
+    /// Arrow or ring; nothing for an outline.
+    sign: Rect,
+    /// The label, with the center that it should have.
+    label: Option<(Arc<Galley>, Pos2)>,
+}
+
 impl Marks {
     /// Marks found and selected identities that are hard to see in the frame in `shown`.
     pub(super) fn show(
@@ -71,14 +82,16 @@ impl Marks {
         let numbers = queries.numbers().into_iter().take(MOST_NUMBERS).filter_map(|(id, n)| {
             let center = semantics.identities.shapes.get(id)?.center();
             let at = place(shown, eye.project(center)?);
-            shown.contains(at).then_some((at, n))
+            shown.contains(at).then_some((id, at, n))
         });
-        numbers::show(&ui.painter_at(shown), &numbers.collect::<Vec<_>>());
+        let numbers: Vec<(IdentityId, Pos2, usize)> = numbers.collect();
         let mut targets = queries.found_colors();
         targets.extend(selected.map(|id| (id, theme::accent())).filter(|t| targets.iter().all(|f| f.0 != t.0)));
         targets.retain(|(id, _)| {
             semantics.identities.get(*id).is_some() && visibility.draws(&semantics.identities, *id) != Some(false)
         });
+        let painter = ui.painter_at(shown);
+        let mut drawn = Vec::new();
         for (id, color) in targets.into_iter().take(MOST) {
             let points = self.points(cloud, semantics, id);
             if points.is_empty() {
@@ -87,21 +100,36 @@ impl Marks {
             let places: Vec<Pos2> = points.iter().filter_map(|p| eye.project(*p)).map(|p| place(shown, p)).collect();
             let inside = places.iter().filter(|p| shown.contains(**p)).count();
             let size = queries.span_of(semantics, id).map(|span| span.map(|span| span * shown.size()));
-            let painter = ui.painter_at(shown);
             let name = text::elided(&cx.state.labels.full_name(&semantics.identities, id), 40);
-            let at = match mark(inside as f32 / points.len() as f32, size) {
+            let label = |text: String| painter.layout_no_wrap(text, FontId::proportional(12.5), theme::text());
+            let (sign, label) = match mark(inside as f32 / points.len() as f32, size) {
                 Mark::None => continue,
-                Mark::Arrow => arrow(&painter, shown, way(eye, &points), color, &name),
+                Mark::Arrow => {
+                    let label = label(name.clone());
+                    let (sign, beside) = arrow(&painter, shown, way(eye, &points), color, label.size());
+                    (sign, Some((label, beside)))
+                }
                 Mark::Ghost => {
                     let why = visibility.why_not_drawn(&semantics.identities, id).unwrap_or("occluded");
-                    ghost(&painter, &hull(places), color, &format!("{name} ({why})"))
+                    let label = label(format!("{name} ({why})"));
+                    let over = ghost(&painter, &hull(places), color, label.size());
+                    (Rect::NOTHING, Some((label, over)))
                 }
-                Mark::Ring => ring(&painter, middle(&places), color),
+                // A number says where it is, and a ring would lie over the numbers beside it.
+                Mark::Ring => {
+                    let is_numbered = numbers.iter().any(|(numbered, ..)| *numbered == id);
+                    (ring(&painter, middle(&places), color, is_numbered), None)
+                }
             };
-            let button = ui.interact(at, ui.scope_id().with(("mark", id, queries.is_second())), Sense::click());
-            button.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Button, true, format!("Fly to {name}")));
+            drawn.push(DrawnMark { id, name, sign, label });
+        }
+        let areas = show_labels(&painter, &drawn);
+        numbers::show(&painter, &numbers.iter().map(|(_, at, n)| (*at, *n)).collect::<Vec<_>>());
+        for (mark, area) in drawn.iter().zip(areas) {
+            let button = ui.interact(area, ui.scope_id().with(("mark", mark.id, queries.is_second())), Sense::click());
+            button.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Button, true, format!("Fly to {}", mark.name)));
             if button.on_hover_text("Click to fly there").on_hover_cursor(egui::CursorIcon::PointingHand).clicked() {
-                cx.ask(Action::GoToTarget(id, Side::Best));
+                cx.ask(Action::GoToTarget(mark.id, Side::Best));
             }
         }
     }
@@ -174,8 +202,32 @@ fn way(eye: &Camera, points: &[DVec3]) -> Vec2 {
     vec2(way.x as f32, way.y as f32)
 }
 
-/// Draws an arrow at the border of the view, with a name beside it. Returns the clickable area.
-fn arrow(painter: &Painter, shown: Rect, way: Vec2, color: Color32, name: &str) -> Rect {
+/// Draws the labels of marks, none over another or another's arrow. Returns the clickable area of each mark.
+fn show_labels(painter: &Painter, marks: &[DrawnMark]) -> Vec<Rect> {
+    const MARGIN: Vec2 = vec2(6.0, 3.0);
+    let size = |label: &(Arc<Galley>, Pos2)| label.0.size() + 2.0 * MARGIN;
+    // One without a label takes no room.
+    let wanted = marks.iter().map(|mark| mark.label.as_ref().map_or((Pos2::ZERO, Vec2::ZERO), |l| (l.1, size(l))));
+    let wanted: Vec<(Pos2, Vec2)> = wanted.collect();
+    let signs: Vec<Rect> = marks.iter().map(|mark| mark.sign).collect();
+    let placed = labels_apart(&wanted, &signs, painter.clip_rect());
+    let show = |((mark, at), (before, size)): ((&DrawnMark, Pos2), &(Pos2, Vec2))| {
+        let Some((galley, _)) = &mark.label else { return mark.sign };
+        let area = Rect::from_center_size(at, *size);
+        let is_moved = at != *before;
+        if is_moved && mark.sign.is_positive() {
+            painter.line_segment([mark.sign.center(), at], Stroke::new(1.0, Color32::from_white_alpha(160)));
+        }
+        painter.rect_filled(area, 5.0, Color32::from_black_alpha(190));
+        painter.galley(area.min + MARGIN, Arc::clone(galley), theme::text());
+        // With its arrow, a moved label would take the clicks of others.
+        if is_moved { area } else { area.union(mark.sign) }
+    };
+    marks.iter().zip(placed).zip(&wanted).map(show).collect()
+}
+
+/// Draws an arrow at the border of the view. Returns its area, and the center of a label of this size beside it.
+fn arrow(painter: &Painter, shown: Rect, way: Vec2, color: Color32, label: Vec2) -> (Rect, Pos2) {
     let room = shown.shrink(26.0);
     let half = room.size() / 2.0;
     let reach = (half.x / way.x.abs().max(1e-6)).min(half.y / way.y.abs().max(1e-6));
@@ -183,34 +235,27 @@ fn arrow(painter: &Painter, shown: Rect, way: Vec2, color: Color32, name: &str) 
     let (back, across) = (tip - way * 20.0, way.rot90() * 10.0);
     let corners = vec![tip, back + across, back - across];
     painter.add(Shape::convex_polygon(corners, color, Stroke::new(2.0, HALO.color)));
-    let galley = painter.layout_no_wrap(name.to_owned(), FontId::proportional(12.5), theme::text());
-    let beside = back - way * (14.0 + 0.5 * galley.size().x * way.x.abs()) - 0.5 * galley.size();
-    let label = Rect::from_min_size(beside, galley.size()).expand2(vec2(6.0, 3.0));
-    painter.rect_filled(label, 5.0, Color32::from_black_alpha(190));
-    painter.galley(beside, galley, theme::text());
-    label.union(Rect::from_center_size(tip - way * 10.0, Vec2::splat(26.0)))
+    let beside = back - way * (14.0 + 0.5 * label.x * way.x.abs());
+    (Rect::from_center_size(tip - way * 10.0, Vec2::splat(26.0)), beside)
 }
 
-/// Draws a dashed outline with a name over it. Returns the clickable area, at the name.
-fn ghost(painter: &Painter, outline: &[Pos2], color: Color32, name: &str) -> Rect {
+/// Draws a dashed outline. Returns the center of a label of this size over it.
+fn ghost(painter: &Painter, outline: &[Pos2], color: Color32, label: Vec2) -> Pos2 {
     let closed: Vec<Pos2> = outline.iter().chain(outline.first()).copied().collect();
     painter.add(Shape::line(closed.clone(), HALO));
     painter.extend(Shape::dashed_line(&closed, Stroke::new(2.0, color), 7.0, 5.0));
-    let galley = painter.layout_no_wrap(name.to_owned(), FontId::proportional(12.5), theme::text());
     let over = Rect::from_points(outline);
     let room = painter.clip_rect().shrink(6.0);
-    let at = pos2(over.center().x - 0.5 * galley.size().x, over.top() - galley.size().y - 8.0);
-    let at = at.clamp(room.min, (room.max - galley.size()).max(room.min));
-    let label = Rect::from_min_size(at, galley.size()).expand2(vec2(6.0, 3.0));
-    painter.rect_filled(label, 5.0, Color32::from_black_alpha(190));
-    painter.galley(at, galley, theme::text());
-    label
+    let at = pos2(over.center().x - 0.5 * label.x, over.top() - label.y - 8.0);
+    at.clamp(room.min, (room.max - label).max(room.min)) + 0.5 * label
 }
 
-/// Draws a ring around something small. Returns the clickable area.
-fn ring(painter: &Painter, at: Pos2, color: Color32) -> Rect {
-    painter.circle_stroke(at, 17.0, HALO);
-    painter.circle_stroke(at, 17.0, Stroke::new(2.0, color));
+/// Draws a ring around something small, unless a number is there. Returns the clickable area.
+fn ring(painter: &Painter, at: Pos2, color: Color32, is_numbered: bool) -> Rect {
+    if !is_numbered {
+        painter.circle_stroke(at, 17.0, HALO);
+        painter.circle_stroke(at, 17.0, Stroke::new(2.0, color));
+    }
     Rect::from_center_size(at, Vec2::splat(36.0))
 }
 

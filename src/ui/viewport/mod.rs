@@ -1,6 +1,7 @@
 //! The viewport: shows the frames of the view thread and moves the camera.
 
 mod act;
+mod apart;
 pub(crate) mod compared;
 mod display;
 pub mod eye;

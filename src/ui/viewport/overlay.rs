@@ -26,6 +26,9 @@ use crate::worker::view::ViewPicture;
 /// Width below which a view has menus in place of buttons, points.
 const NARROW: f32 = 480.0;
 
+/// Width below which the menus are narrow, too, points.
+const NARROWEST: f32 = 300.0;
+
 /// Width below which the legend stands above the facts, points.
 const NARROW_BESIDE_FACTS: f32 = 760.0;
 
@@ -76,6 +79,7 @@ impl ViewCards<'_> {
         let photos = dataset.map_or(0, |d| d.photos.len());
         let (modes, legend) = if second { ("second modes", "second legend") } else { ("modes", "legend") };
         let menus = cx.layout.split_view || rect.width() < NARROW;
+        let menus = menus.then_some(if rect.width() < NARROWEST { [52.0, 62.0] } else { [76.0, 86.0] });
         card(ui, rect, modes, Align2::LEFT_TOP, 0.0, |ui| {
             // One card asks all scenes that are compared.
             self.modes(ui, menus, is_other || figures.is_some(), photos > 0, cx);
@@ -218,8 +222,8 @@ impl ViewCards<'_> {
         }
     }
 
-    /// Draws the choice of the mode; as menus if the view is narrow or one of two.
-    fn modes(&mut self, ui: &mut Ui, menus: bool, is_other: bool, has_photos: bool, cx: &mut Ctx<'_>) {
+    /// Draws the choice of the mode; as menus of these widths if the view is narrow or one of two.
+    fn modes(&mut self, ui: &mut Ui, menus: Option<[f32; 2]>, is_other: bool, has_photos: bool, cx: &mut Ctx<'_>) {
         ui.spacing_mut().item_spacing.x = 2.0;
         let shown = *cx.layout.mode_of(self.queries.is_second());
         let mut buttons = |ui: &mut Ui| {
@@ -231,14 +235,15 @@ impl ViewCards<'_> {
                 }
             }
         };
-        if menus {
-            let mode = ComboBox::from_id_salt("mode").selected_text(shown.text()).width(76.0).show_ui(ui, buttons);
-            mode.response.on_hover_text("What the view shows").accessible_name("Mode");
+        if let Some([mode_pt, tint_pt]) = menus {
+            let mode = ComboBox::from_id_salt("mode").selected_text(shown.text()).width(mode_pt).truncate();
+            let mode = mode.show_ui(ui, buttons);
+            mode.response.on_hover_text(format!("What the view shows: {}", shown.text())).accessible_name("Mode");
             if is_other {
                 return;
             }
             let colored_by = self.queries.settings().color_by;
-            let tints = ComboBox::from_id_salt("color by").selected_text(colored_by.text()).width(86.0);
+            let tints = ComboBox::from_id_salt("color by").selected_text(colored_by.text()).width(tint_pt).truncate();
             let tints = tints.show_ui(ui, |ui| {
                 for &by in ColorBy::VARIANTS {
                     if ui.selectable_label(colored_by == by, by.text()).clicked() && colored_by != by {
@@ -246,7 +251,7 @@ impl ViewCards<'_> {
                     }
                 }
             });
-            tints.response.on_hover_text("Overlay").accessible_name("Color by");
+            tints.response.on_hover_text(format!("Overlay: {}", colored_by.text())).accessible_name("Color by");
         } else {
             buttons(ui);
         }
@@ -363,7 +368,7 @@ fn other_fills(ui: &mut Ui, last: &RemoveRequest, is_wide: bool, cx: &mut Ctx<'_
         }
         // A retrained scene also holds photos, which are not deleted.
         let delete = Action::DeleteRemoved;
-        if !last.retrain && ui.button(delete.text()).on_hover_text(delete.tooltip()).clicked() {
+        if !last.retrain && ui.button("Delete this copy\u{2026}").on_hover_text(delete.tooltip()).clicked() {
             cx.ask(delete);
             ui.close();
         }

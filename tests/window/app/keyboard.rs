@@ -259,7 +259,7 @@ fn everything_that_can_be_reached_has_a_name() {
     named(&mut w, "training");
     w.ask(Action::Open(write_splat(folder.path())));
     named(&mut w, "a question");
-    w.click("Cancel and continue");
+    w.click("Stop and continue");
     w.until("the splat", |a| a.state.scene.as_ref().is_some_and(|s| s.name == "dots"));
     named(&mut w, "a splat");
 }

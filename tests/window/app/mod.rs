@@ -239,7 +239,7 @@ fn the_demo_is_made_opened_and_trained_by_itself() {
     assert!(w.app().state.history.steps.iter().all(|s| s.loss.is_finite() && s.gaussians > 100));
     w.harness.key_press(egui::Key::T);
     w.until("the pause", |a| a.state.job.as_ref().is_some_and(|j| j.paused));
-    w.click("Cancel");
+    w.click("Stop the running job");
     w.until("the end", |a| a.state.job.is_none());
     assert!(w.app().state.error.is_none() && w.app().state.recent.is_empty());
 }
@@ -280,7 +280,7 @@ fn training_moves_the_plot_pauses_resumes_and_is_cancelled() {
 
     w.harness.key_press(egui::Key::Escape);
     w.harness.run_steps(2);
-    w.click("Cancel it");
+    w.click("Stop");
     w.until("the end", |a| a.state.job.is_none());
     assert!(w.app().state.error.is_none(), "{:?}", w.app().state.error);
     let reached = last_step(w.app());
@@ -337,7 +337,7 @@ fn opening_something_else_while_a_job_runs_asks_first() {
     w.click("Keep running");
     assert!(w.app().state.is_training());
     w.ask(Action::Open(splat));
-    w.click("Cancel and continue");
+    w.click("Stop and continue");
     w.until("the splat", |a| a.state.scene.as_ref().is_some_and(|s| s.name == "dots"));
 }
 

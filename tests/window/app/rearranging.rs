@@ -4,7 +4,7 @@
 use std::path::Path;
 
 use egui::accesskit::Role;
-use egui::{Event, Modifiers, PointerButton, Pos2};
+use egui::{Event, Key, Modifiers, PointerButton, Pos2};
 use egui_kittest::kittest::Queryable;
 use rand::{RngExt, SeedableRng};
 
@@ -122,6 +122,24 @@ fn a_box_is_recolored_and_doubled_and_a_hundred_steps_back_and_forth_lose_nothin
     }
     assert!(cloud(w.app()) == states[0], "bit for bit");
     assert_eq!(w.app().state.semantics.as_ref().expect("objects").identities.len(), 3);
+}
+
+#[test]
+fn enter_applies_what_the_card_shows_and_escape_leaves_it() {
+    let folder = tempfile::tempdir().expect("folder");
+    let mut w = window(folder.path());
+    let before = cloud(w.app());
+    for (key, applies) in [(Key::Escape, false), (Key::Enter, true)] {
+        w.ask(Action::Transform(1));
+        w.harness.run_steps(2);
+        tick(&mut w, "Color");
+        w.press(key);
+        if applies {
+            w.until("it is changed", |a| a.viewport.cloud().is_some_and(|c| ***c != before));
+        } else {
+            assert!(!w.shows("drag an arrow or type values") && cloud(w.app()) == before, "the control");
+        }
+    }
 }
 
 #[test]

@@ -37,7 +37,7 @@ fn a_scene_without_a_box_is_seen_beside_and_opened() {
     let answer = |w: &mut super::Window, answer: &str| {
         w.click("Options");
         w.harness.run_steps(3);
-        w.click("Delete this scene\u{2026}");
+        w.click("Delete this copy\u{2026}");
         w.harness.run_steps(3);
         w.click(answer);
         w.harness.run_steps(3);

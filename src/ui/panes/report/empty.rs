@@ -29,7 +29,8 @@ pub(crate) fn show(ui: &mut Ui, job: Option<&RunningJob>, cx: &mut Ctx<'_>) {
         } else {
             ui.weak("Rendering the exact reference images.");
         }
-        if ui.add(egui::Button::new("Cancel").min_size(vec2(92.0, 28.0))).clicked() {
+        let button = ui.add(egui::Button::new("Stop").min_size(vec2(92.0, 28.0)));
+        if button.accessible_name(Action::Cancel.text()).clicked() {
             cx.ask(Action::Cancel);
         }
         return;

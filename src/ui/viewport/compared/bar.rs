@@ -8,6 +8,7 @@ use crate::jobs::compare::cell::ShownRelevancy;
 use crate::jobs::models::ModelRole;
 use crate::ui::actions::Action;
 use crate::ui::ctx::Ctx;
+use crate::ui::paired::paired;
 use crate::ui::text_field::take_keyboard;
 use crate::ui::theme;
 
@@ -34,10 +35,11 @@ impl Compared {
             self.scale(ui);
             self.rule(ui);
             self.encoder(ui, cx);
-            let label = ui.label(RichText::new("Opacity").small()).id;
             ui.spacing_mut().slider_width = 70.0;
             let opacity = Slider::new(&mut self.choices.opacity, 0.0..=1.0).show_value(false);
-            ui.add(opacity).on_hover_text("Opacity of relevancy").labelled_by(label);
+            paired(ui, RichText::new("Opacity").small(), 70.0, |ui, label| {
+                ui.add(opacity).on_hover_text("Opacity of relevancy").labelled_by(label);
+            });
             legend::bar(ui, COLORS, self.range().map(|v| format!("{v:.2}")));
             if let Some(why) = &self.problem {
                 ui.colored_label(theme::error(), why);

@@ -1,6 +1,6 @@
 //! The query field: typing, completion from known names, history.
 
-use egui::{Event, Id, InputState, Key, Modifiers, RichText, TextEdit, Ui};
+use egui::{Color32, Event, Id, InputState, Key, Modifiers, RichText, TextEdit, TextStyle, Ui};
 
 use super::Queries;
 use crate::scene::SemanticMap;
@@ -35,7 +35,7 @@ pub(super) fn show(ui: &mut Ui, queries: &mut Queries, width: f32, semantics: &S
     let complete = focused && !offered.is_empty() && ui.input_mut(|i| i.consume_key(Modifiers::NONE, Key::Tab));
     let edit = TextEdit::singleline(&mut side.typed)
         .id(id)
-        .hint_text("Find an object or part, e.g. \u{201c}the button of the red controller\u{201d}  ( / )")
+        .hint_text(hint(ui, width))
         .char_limit(2_000)
         // Tab completes, if there is a completion.
         .lock_focus(!offered.is_empty())
@@ -58,6 +58,27 @@ pub(super) fn show(ui: &mut Ui, queries: &mut Queries, width: f32, semantics: &S
         }
     }
     (focused, offered)
+}
+
+/// Hints of the empty field, the longest first.
+const HINTS: [&str; 5] = [
+    "Find an object or part, e.g. \u{201c}the button of the red controller\u{201d}  ( / )",
+    "Find an object or part, e.g. \u{201c}kettle lid\u{201d}  ( / )",
+    "Find an object or part  ( / )",
+    "Find an object or part",
+    "Find  ( / )",
+];
+
+/// The longest hint that a field of this width shows whole.
+fn hint(ui: &Ui, width: f32) -> &'static str {
+    /// Margins of the field, points.
+    const MARGINS: f32 = 10.0;
+    let font = TextStyle::Body.resolve(ui.style());
+    let fits = |hint: &&&str| {
+        let galley = ui.painter().layout_no_wrap((**hint).to_owned(), font.clone(), Color32::WHITE);
+        galley.size().x <= width - MARGINS
+    };
+    HINTS.iter().find(fits).or(HINTS.last()).copied().unwrap_or_default()
 }
 
 /// Draws buttons of the completions, unless the first is already typed.
@@ -115,4 +136,20 @@ fn leave_out_slashes(ui: &Ui) {
 fn goes_on(input: &InputState) -> bool {
     let is_key = |e: &Event| matches!(e, Event::Key { key, pressed: true, .. } if *key != Key::Slash);
     input.pointer.any_pressed() || input.events.iter().any(is_key)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_field_shows_the_longest_hint_that_it_has_room_for() {
+        let mut shown = Vec::new();
+        let mut harness =
+            egui_kittest::Harness::new_ui(|ui| shown = [900.0, 240.0, 20.0].map(|width| hint(ui, width)).to_vec());
+        harness.run_steps(2);
+        drop(harness);
+        assert_eq!((shown[0], shown[2]), (HINTS[0], HINTS[4]));
+        assert!(HINTS[1..4].contains(&shown[1]), "{}", shown[1]);
+    }
 }

@@ -31,11 +31,11 @@ const NAMED: usize = 3;
 pub(super) fn show(ui: &mut Ui, queries: &mut Queries, scene: SearchedScene<'_>, cx: &mut Ctx<'_>) {
     let Some(newest) = queries.side().live.clone() else { return };
     if let Some(mended) = mended_text(&newest.reading.mended) {
-        ui.weak(text::shortened(&mended, 120));
+        ui.weak(text::shortened_at_word(&mended, 120));
     }
     let ignored = newest.ignored.join("\u{201d}, \u{201c}");
     if !ignored.is_empty() {
-        let text = format!("Ignored: \u{201c}{}\u{201d}.", text::shortened(&ignored, 80));
+        let text = format!("Ignored: \u{201c}{}\u{201d}.", text::shortened_at_word(&ignored, 80));
         ui.colored_label(theme::warning(), text);
     }
     let shown = newest.shown(&queries.side().settings);
@@ -123,7 +123,8 @@ fn show_target(
         let (certainty, color, numbers) = certainty(newest);
         ui.colored_label(color, certainty).on_hover_text(numbers);
         if let Some(bounds) = facts.bounds {
-            ui.weak(size_text(bounds, state)).on_hover_text("Longest edge of its bounding box");
+            let text = format!("\u{b7} {} long", size_text(bounds, state));
+            ui.weak(text).on_hover_text("Longest edge of its bounding box");
         }
         let unseen = if is_empty { Some(EMPTY) } else { why_unseen(queries, scene, target) };
         if let Some(why) = unseen {
@@ -198,7 +199,7 @@ fn nothing_text(newest: &Asked, identities: &Identities) -> String {
         return "It was removed from this scene.".to_owned();
     }
     let unexplained = newest.unexplained.join("\u{201d}, \u{201c}");
-    match &*text::shortened(&unexplained, 80) {
+    match &*text::shortened_at_word(&unexplained, 80) {
         "" => "No match.".to_owned(),
         words => format!("No match for \u{201c}{words}\u{201d}."),
     }

@@ -89,7 +89,7 @@ fn show_target(ui: &mut Ui, target: IdentityId, facts: &Facts, cx: &mut Ctx<'_>)
     let size = edges.map(|e| format!("  \u{00b7}  box {e}")).unwrap_or_default();
     let gaussians = format::things(facts.gaussians, "Gaussian");
     ui.label(RichText::new(format!("{gaussians}{size}")).small().color(theme::weak()));
-    ui.horizontal(|ui| {
+    ui.horizontal_wrapped(|ui| {
         ui.menu_button(RichText::new("Go there\u{2026}").small(), |ui| {
             for &side in Side::VARIANTS {
                 if ui.button(side.text()).clicked() {

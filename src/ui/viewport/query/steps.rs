@@ -17,10 +17,10 @@ const LONGEST: usize = 160;
 pub(super) fn show_said(ui: &mut Ui, asked: &Asked) {
     let Some(understood) = &asked.answered.understood else { return };
     if let Some(said) = &understood.said {
-        ui.label(RichText::new(text::shortened(said, LONGEST)).strong());
+        ui.label(RichText::new(text::shortened_at_word(said, LONGEST)).strong());
     }
     for note in &understood.notes {
-        ui.label(RichText::new(text::shortened(note, LONGEST)).small().color(theme::weak()));
+        ui.label(RichText::new(text::shortened_at_word(note, LONGEST)).small().color(theme::weak()));
     }
 }
 
@@ -52,7 +52,7 @@ pub(super) fn show_misunderstood(ui: &mut Ui, asked: &Asked) {
         ui.add(egui::Label::new(job).wrap());
     }
     if unmet.why == Why::Nothing {
-        ui.label(RichText::new(text::shortened(&unmet.text, LONGEST)).small().color(theme::weak()));
+        ui.label(RichText::new(text::shortened_at_word(&unmet.text, LONGEST)).small().color(theme::weak()));
     }
 }
 
@@ -65,7 +65,7 @@ pub(super) fn show_steps(ui: &mut Ui, queries: &mut Queries, asked: &Asked, sema
     let mut relaxed = None;
     for step in steps {
         let indent = "\u{2003}".repeat(step.depth.min(4));
-        let told = format!("{indent}{}", text::shortened(step.text.trim(), LONGEST));
+        let told = format!("{indent}{}", text::shortened_at_word(step.text.trim(), LONGEST));
         let row = egui::Sides::new().shrink_left().truncate();
         let what = |ui: &mut Ui| ui.label(told);
         let effect = |ui: &mut Ui| {

@@ -1,6 +1,6 @@
 //! Times of a query: a thin bar in the colors of its stages, with their numbers.
 
-use egui::{Color32, Rect, RichText, Sense, Ui, pos2, vec2};
+use egui::{Color32, Label, Rect, RichText, Sense, Ui, pos2, vec2};
 
 use crate::math::format::millis;
 use crate::pipeline::semantics::query::timing::{STAGES, StagesMs};
@@ -32,10 +32,11 @@ pub(crate) fn show(ui: &mut Ui, basis: &str, stages: &StagesMs) {
     }
     let numbers = ui.horizontal_wrapped(|ui| {
         ui.spacing_mut().item_spacing = vec2(6.0, 0.0);
-        let small = |text: String, color| RichText::new(text).small().color(color);
-        ui.label(small(format!("{basis} in {}", millis(stages.whole() / 1e3)), theme::text()));
+        // A line break stands between two of them, not within one.
+        let mut show = |text: String, color| ui.add(Label::new(RichText::new(text).small().color(color)).extend());
+        show(format!("{basis} in {}", millis(stages.whole() / 1e3)), theme::text());
         for (name, (color, ms)) in STAGES.into_iter().zip(COLORS.into_iter().zip(stages.values())) {
-            ui.label(small(format!("{name} {}", millis(ms / 1e3)), color));
+            show(format!("{name} {}", millis(ms / 1e3)), color);
         }
     });
     bar.union(numbers.response).on_hover_text(MEANING);

@@ -75,7 +75,7 @@ impl ToolCard {
         let is_large = rect.height() >= LOW_PT && rect.width() >= NARROW_PT;
         let is_folded = folds && !form.unfolded.unwrap_or(is_large);
         let area = Area::new(Id::unique(id)).order(order).pivot(pivot).fixed_pos(at + form.moved);
-        let drawn = theme::card(ui.ctx(), area.constrain_to(rect), |ui| {
+        let drawn = theme::solid_card(ui.ctx(), area.constrain_to(rect), |ui| {
             width.into_iter().for_each(|width| ui.set_width(width[usize::from(!is_folded)]));
             let handle = ui.horizontal(|ui| {
                 if folds {

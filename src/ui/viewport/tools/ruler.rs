@@ -18,6 +18,7 @@ use crate::scene::upright_box::UprightBox;
 use crate::scene::{SemanticMap, text};
 use crate::ui::actions::Action;
 use crate::ui::ctx::Ctx;
+use crate::ui::paired::paired;
 use crate::ui::state::AppState;
 use crate::ui::{keys, theme};
 use crate::worker::Versioned;
@@ -41,12 +42,14 @@ pub(crate) struct Ruler {
     waiting: Vec<(Pose, DVec2)>,
     /// True if the last click met no surface.
     missed: bool,
+    /// Number of measurements in the list at the last redraw.
+    listed: usize,
 }
 
 impl Default for Ruler {
     fn default() -> Self {
         let (kind, points, waiting) = (MeasurementKind::Length, Vec::new(), Vec::new());
-        Self { kind, points, known: String::new(), waiting, missed: false }
+        Self { kind, points, known: String::new(), waiting, missed: false, listed: usize::MAX }
     }
 }
 
@@ -170,11 +173,11 @@ impl Ruler {
     fn uses(&mut self, ui: &mut Ui, value: &MeasuredValue, eye: DVec3, cx: &mut Ctx<'_>) {
         match value {
             MeasuredValue::Length(_) => {
-                ui.separator();
-                ui.label("True length");
-                let known = TextEdit::singleline(&mut self.known).hint_text("0.30").desired_width(50.0);
-                ui.add(known).accessible_name("True length in meters");
-                ui.label("m");
+                paired(ui, "True length".into(), 90.0, |ui, _| {
+                    let known = TextEdit::singleline(&mut self.known).hint_text("0.30").desired_width(50.0);
+                    ui.add(known).accessible_name("True length in meters");
+                    ui.label("m");
+                });
                 let scale = self.scale();
                 let set = ui.add_enabled(scale.is_some(), Button::new("Set scale"));
                 if let Some(scale) = scale.filter(|_| set.clicked()) {
@@ -184,7 +187,6 @@ impl Ruler {
             MeasuredValue::Area(fit) => {
                 let is_below = self.points.first().is_some_and(|p| fit.normal.dot(eye - *p) < 0.0);
                 let normal = if is_below { -fit.normal } else { fit.normal };
-                ui.separator();
                 if ui.button("Use as the floor").on_hover_text(Action::SetUp(normal).tooltip()).clicked() {
                     cx.ask(Action::SetUp(normal));
                 }
@@ -223,7 +225,14 @@ impl ViewTool for Ruler {
         card.show(ui, |ui, is_folded| {
             ui.spacing_mut().item_spacing.y = 5.0;
             if !is_folded {
-                list(ui, scene.measurements, meters_per_unit(state), cx);
+                let is_longer =
+                    scene.measurements.len() > std::mem::replace(&mut self.listed, scene.measurements.len());
+                list(ui, scene.measurements, meters_per_unit(state), is_longer, cx);
+            }
+            let uses = self.kind.value(&self.measured(scene, state.semantics.as_ref())).ok();
+            let has_use = |value: &MeasuredValue| matches!(value, MeasuredValue::Length(_) | MeasuredValue::Area(_));
+            if let Some(value) = uses.filter(|value| has_use(value) && (has_room || !is_folded)) {
+                ui.horizontal_wrapped(|ui| self.uses(ui, &value, scene.eye.center, cx));
             }
             self.kinds(ui, cx);
             let value = self.kind.value(&self.measured(scene, state.semantics.as_ref()));
@@ -247,9 +256,6 @@ impl ViewTool for Ruler {
                 if ui.add_enabled(has_points, Button::new("Clear")).clicked() {
                     (self.points, self.waiting) = (Vec::new(), Vec::new());
                 }
-                if let Some(value) = value.as_ref().ok().filter(|_| has_room || !is_folded) {
-                    self.uses(ui, value, scene.eye.center, cx);
-                }
             });
         });
         if !keys::is_typing(ui.ctx()) && ui.input(|i| i.key_pressed(Key::Backspace)) {
@@ -258,8 +264,8 @@ impl ViewTool for Ruler {
     }
 }
 
-/// Draws the kept measurements.
-fn list(ui: &mut Ui, all: &mut Vec<Measurement>, meters: Option<f64>, cx: &mut Ctx<'_>) {
+/// Draws the kept measurements, scrolled to the newest if `to_end`.
+fn list(ui: &mut Ui, all: &mut Vec<Measurement>, meters: Option<f64>, to_end: bool, cx: &mut Ctx<'_>) {
     if all.is_empty() {
         return;
     }
@@ -273,8 +279,9 @@ fn list(ui: &mut Ui, all: &mut Vec<Measurement>, meters: Option<f64>, cx: &mut C
     });
     let mut gone = None;
     ScrollArea::vertical().max_height(LIST_PT).show(ui, |ui| {
+        let last = all.len().saturating_sub(1);
         for (i, m) in all.iter_mut().enumerate() {
-            ui.horizontal(|ui| {
+            let row = ui.horizontal(|ui| {
                 let mut is_shown = !m.hidden;
                 let tick = ui.checkbox(&mut is_shown, "").on_hover_text("Show it in the view.");
                 tick.accessible_name(format!("{} is visible", m.name));
@@ -299,6 +306,9 @@ fn list(ui: &mut Ui, all: &mut Vec<Measurement>, meters: Option<f64>, cx: &mut C
                     }
                 });
             });
+            if to_end && i == last {
+                row.response.scroll_to_me(None);
+            }
         }
     });
     if let Some(gone) = gone {

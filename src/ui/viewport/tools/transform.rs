@@ -182,18 +182,19 @@ impl TransformTool {
             ui.horizontal(|ui| {
                 let keep = Action::ApplyTransform;
                 let button = ui.add_enabled(self.is_something(), theme::primary_button("Apply"));
-                if button.on_hover_text(keep.tooltip()).clicked() {
+                if button.on_hover_text(format!("{}  Enter", keep.tooltip())).clicked() {
                     cx.ask(keep);
                 }
                 if ui.add_enabled(self.is_something(), egui::Button::new("Reset")).clicked() {
                     (self.arrangement, self.degrees) = (Arrangement::of(self.arrangement.id), 0.0);
                 }
+                if ui.button("Cancel").on_hover_text("Escape").clicked() {
+                    cx.ask(Action::SegmentNew(None));
+                }
+                // Last, as not every thing has a whole: no other button slides under the pointer.
                 let whole = all.get(self.arrangement.id).map_or(NO_IDENTITY, |i| i.parent);
                 if whole != NO_IDENTITY && ui.button("All of it").on_hover_text(all.full_name(whole)).clicked() {
                     cx.ask(Action::Transform(whole));
-                }
-                if ui.button("Cancel").clicked() {
-                    cx.ask(Action::SegmentNew(None));
                 }
             });
         });

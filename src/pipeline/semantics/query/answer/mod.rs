@@ -96,8 +96,12 @@ pub(crate) fn answer(
     }
     let mut meant = by_embedding(identities, phrase, level, recipe, language);
     let first = meant.chosen(1);
-    let alike = || meant.answer.hits().iter().filter(|hit| first.contains(&hit.identity)).copied().collect();
-    let alike: Vec<Hit> = if is_strict { alike() } else { Vec::new() };
+    // Without a telling word, or in another color, nothing has much in common with what is asked for.
+    let leaves_out = !grounds::telling(language.unknown).is_empty();
+    let is_alike =
+        |hit: &&Hit| first.contains(&hit.identity) && !grounds::is_of_another_color(identities, hit.identity, phrase);
+    let alike = || meant.answer.hits().iter().filter(is_alike).copied().collect();
+    let alike: Vec<Hit> = if is_strict && !leaves_out { alike() } else { Vec::new() };
     if is_strict {
         meant.answer = grounded(identities, phrase, language, meant.answer);
     }

@@ -148,6 +148,20 @@ fn words_that_an_encoder_leaves_out_and_colors_that_are_not_so_find_nothing() {
     let all = Identities::objects(3);
     let reading = read(&all, "steering wheel", &QueryConfig::default());
     assert_eq!(left_out.unexplained(&reading, &["steering".into()]), ["steering"]);
+    // What looks like the rest of the words is no offer: a purple thing has nothing of a purple elephant.
+    let offered = |unknown: &[String]| {
+        let (all, mut features) = scene();
+        features.encoder = "demo".into();
+        let mut phrases = TextEmbeddings::default();
+        let mut encode = |p: &str| Ok::<_, ()>(if p.contains("elephant") { vec![1.0, 0.0, 0.0] } else { vec![0.5; 3] });
+        let reading = read(&all, "purple elephant", &QueryConfig::default());
+        phrases.learn(&reading.phrase, &QueryConfig::default(), &mut encode).expect("encodes");
+        let language = Language { features: &features, phrases: &phrases, unknown };
+        let place = (LevelFilter::Auto, &QueryPlace::default());
+        let [_, looks] = answer(&all, &reading, place, &QueryConfig::default(), Some(language)).offers(3);
+        looks
+    };
+    assert_eq!((offered(&["elephant".into()]), offered(&[])), (vec![], vec![3]), "the control: every word is known");
     assert_eq!(ask("my wheel", &["my".into()]).chosen(1), [3], "a word that says nothing may be left out");
 }
 

@@ -166,6 +166,20 @@ fn conditions_are_those_of_the_thing_that_is_asked_for() {
 }
 
 #[test]
+fn all_things_of_a_color_are_a_list() {
+    let mut all = Identities::default();
+    for name in ["red controller", "blue controller", "red apple"] {
+        all.add(Level::Object, NO_IDENTITY, vec![name.into()]);
+    }
+    for text in ["all red things", "all red objects", "all the red things", "every red thing", "everything red"] {
+        assert_eq!(summary(&all, text), "all 2 red controller", "{text}");
+    }
+    assert_eq!(summary(&all, "all blue things"), "blue controller");
+    // The control: one thing is asked for, and two fit.
+    assert_eq!(summary(&all, "the red thing"), "ambiguous red controller");
+}
+
+#[test]
 fn slips_are_mended_word_by_word_and_words_of_their_own_are_not() {
     let (all, table) = data();
     let (slips, own) = (rows(&table, "slips"), rows(&table, "own_words"));

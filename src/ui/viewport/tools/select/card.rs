@@ -1,6 +1,6 @@
 //! The card of the selection: shape, changes, and what becomes of it.
 
-use egui::{Button, ComboBox, Key, ProgressBar, Rect, RichText, Slider, TextEdit, Ui, vec2};
+use egui::{Button, ComboBox, Key, Label, ProgressBar, Rect, RichText, Slider, TextEdit, Ui, vec2};
 use strum::VariantArray;
 
 use super::super::ToolScene;
@@ -49,11 +49,7 @@ pub(super) fn show(tool: &mut SelectTool, ui: &Ui, rect: Rect, scene: &ToolScene
         {
             ui.horizontal(|ui| {
                 ui.label("Keep as");
-                let name = TextEdit::singleline(&mut tool.name).hint_text("Name").char_limit(80);
-                let name = ui.add(name.desired_width(130.0)).accessible_name("Name of what is selected");
-                if name.lost_focus() && ui.input(|i| i.key_pressed(Key::Enter)) && !tool.is_empty() {
-                    cx.ask(Action::AddPainted);
-                }
+                name_field(tool, ui, cx);
                 let text =
                     if of == NO_IDENTITY { "an object".to_owned() } else { format!("part of {}", all.label(of)) };
                 let whole = ComboBox::from_id_salt("whole").selected_text(text).width(120.0);
@@ -67,7 +63,12 @@ pub(super) fn show(tool: &mut SelectTool, ui: &Ui, rect: Rect, scene: &ToolScene
                 whole.response.accessible_name("What it becomes");
             });
         }
-        status(tool, ui, scene, cx);
+        ui.horizontal(|ui| {
+            if is_folded && matches!(tool.purpose, SelectFor::New(_)) {
+                name_field(tool, ui, cx);
+            }
+            status(tool, ui, scene, cx);
+        });
         ui.horizontal(|ui| {
             if ui.add_enabled(!tool.is_empty(), theme::primary_button("Keep")).clicked() {
                 cx.ask(Action::AddPainted);
@@ -151,14 +152,23 @@ fn changes(tool: &mut SelectTool, ui: &mut Ui, scene: &ToolScene<'_>) {
     });
 }
 
-/// Draws the state of the selection, and what it takes from a known object, in a row of its own: the buttons below keep
-/// their place.
+/// Draws the state of the selection, and what it takes from a known object, in one row: nothing moves as they change.
 fn status(tool: &SelectTool, ui: &mut Ui, scene: &ToolScene<'_>, cx: &Ctx<'_>) {
-    ui.horizontal(|ui| count(tool, ui, scene, cx));
+    count(tool, ui, scene, cx);
     let all = cx.state.semantics.as_ref().map(|map| &map.identities);
     if let Some((all, taken)) = all.zip(tool.taken_object()) {
         let text = taken.text(&cx.state.labels.full_name(all, taken.from));
-        ui.colored_label(theme::warning(), text);
+        // What is cut is told on hover.
+        ui.add(Label::new(RichText::new(text).color(theme::warning())).truncate());
+    }
+}
+
+/// Draws the field of the name.
+fn name_field(tool: &mut SelectTool, ui: &mut Ui, cx: &mut Ctx<'_>) {
+    let name = TextEdit::singleline(&mut tool.name).hint_text("Name").char_limit(80);
+    let name = ui.add(name.desired_width(130.0)).accessible_name("Name of what is selected");
+    if name.lost_focus() && ui.input(|i| i.key_pressed(Key::Enter)) && !tool.is_empty() {
+        cx.ask(Action::AddPainted);
     }
 }
 

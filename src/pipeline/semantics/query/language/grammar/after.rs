@@ -150,8 +150,12 @@ pub(super) fn after(
         }
     }
     found.extend(compared(g, noun, [i, at, j], not));
-    if said || not || noun.is_any() && colors::row(g.words[at]).is_some() {
+    if said || not {
         found.extend(predicate(g, noun, [i, at, j], not));
+    } else if noun.is_any() && colors::row(g.words[at]).is_some() {
+        // "Everything red". In "all red things", the things that follow are no others.
+        let read = if g.words[k - 1] == "all" { colored } else { predicate };
+        found.extend(read(g, noun, [i, at, j], not));
     }
     found
 }
@@ -307,12 +311,11 @@ fn compared(g: &mut Grammar<'_>, noun: &Expression, [i, at, j]: [usize; 3], not:
     found
 }
 
-/// Reads what is said of a thing after "is": a color, an order, another set.
-fn predicate(g: &mut Grammar<'_>, noun: &Expression, [i, at, j]: [usize; 3], not: bool) -> Vec<Expression> {
+/// Reads a color that is said of a thing: "red", "red or blue".
+fn colored(g: &mut Grammar<'_>, noun: &Expression, [i, at, j]: [usize; 3], not: bool) -> Vec<Expression> {
     let mut found = Vec::new();
-    let from = if matches!(g.words[at], "the" | "a" | "an") && at + 1 < j { at + 1 } else { at };
-    for end in (from + 1..=j).rev() {
-        let words = &g.words[from..end];
+    for end in (at + 1..=j).rev() {
+        let words = &g.words[at..end];
         let plain = |w: &&str| !g.vocabulary.is(WordClass::NoName, w) || matches!(*w, "or" | "and" | "nor");
         let last_is_color = words.last().is_some_and(|w| colors::row(w).is_some() || colors::tone(w).is_some());
         if last_is_color && words.iter().all(plain) && words.len() <= 5 {
@@ -322,6 +325,13 @@ fn predicate(g: &mut Grammar<'_>, noun: &Expression, [i, at, j]: [usize; 3], not
             found.extend(further(g, &made, i, end, j));
         }
     }
+    found
+}
+
+/// Reads what is said of a thing after "is": a color, an order, another set.
+fn predicate(g: &mut Grammar<'_>, noun: &Expression, [i, at, j]: [usize; 3], not: bool) -> Vec<Expression> {
+    let from = if matches!(g.words[at], "the" | "a" | "an") && at + 1 < j { at + 1 } else { at };
+    let mut found = colored(g, noun, [i, from, j], not);
     if let Some(choice) = g.vocabulary.order(g.words[from]).filter(|_| !not) {
         let end = if matches!(g.words.get(from + 1), Some(&("one" | "ones" | "away" | "back"))) {
             from + 2
