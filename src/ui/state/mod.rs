@@ -187,9 +187,11 @@ impl AppState {
         }
     }
 
-    /// Puts a path on top of the recent list.
+    /// Puts a path on top of the recent list, in place of any other path to the same place.
     pub(crate) fn remember(&mut self, path: PathBuf) {
-        self.recent.retain(|p| *p != path);
+        let real = |path: &PathBuf| std::fs::canonicalize(path).ok();
+        let place = real(&path);
+        self.recent.retain(|p| *p != path && (place.is_none() || real(p) != place));
         self.recent.insert(0, path);
         self.recent.truncate(MAX_RECENT);
     }
