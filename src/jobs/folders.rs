@@ -203,7 +203,7 @@ mod tests {
         let typed = Sha256::digest(link.as_os_str().as_encoded_bytes());
         let old = folders.data.join("trained").join(format!("link-{}", files::hex(&typed[..8]))).join("run-1");
         fs::create_dir_all(old).expect("created");
-        assert_eq!(folders.trainings(&link), [own.clone()]);
+        assert_eq!(folders.trainings(&link), std::slice::from_ref(&own));
         assert_eq!(folders.trainings(&photos), [own]);
     }
 

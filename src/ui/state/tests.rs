@@ -162,9 +162,13 @@ fn the_recent_list_is_short_and_has_no_doubles() {
     assert_eq!(s.recent[..2], [PathBuf::from("15"), PathBuf::from("19")]);
     let folder = tempfile::tempdir().expect("folder");
     let [own, other] = ["fox", "other"].map(|name| folder.path().join(name));
-    [&own, &other].map(|path| std::fs::create_dir(path).expect("created"));
+    for path in [&own, &other] {
+        std::fs::create_dir(path).expect("created");
+    }
     s.recent.clear();
-    [&other.join("../fox"), &other, &own].map(|path| s.remember(path.clone()));
+    for path in [other.join("../fox"), other.clone(), own.clone()] {
+        s.remember(path);
+    }
     assert_eq!(s.recent, [own, other], "one place, by its last path");
 }
 
