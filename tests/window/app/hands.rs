@@ -306,6 +306,29 @@ fn the_chat_asks_by_buttons_and_says_where_another_scene_begins() {
 }
 
 #[test]
+fn the_palette_says_that_an_object_is_to_be_selected_first() {
+    let folder = tempfile::tempdir().expect("folder");
+    let mut w = window(folder.path());
+    for selected in [false, true] {
+        if selected {
+            w.ask(Action::Select(Some(1)));
+        }
+        w.ask(Action::Palette);
+        w.types("recolor");
+        w.harness.run_steps(2);
+        assert_eq!(w.shows("select an object first"), !selected);
+        w.press(Key::Enter);
+        w.harness.run_steps(3);
+        assert_eq!(w.shows("Select an object first: click it"), !selected, "it says so");
+        assert_eq!(w.shows("Apply to a copy"), selected, "the tool");
+        if !selected {
+            w.press(Key::Escape);
+            w.harness.run_steps(3);
+        }
+    }
+}
+
+#[test]
 fn one_sentence_of_the_chat_is_one_step_of_undo() {
     let folder = tempfile::tempdir().expect("folder");
     let mut w = window(folder.path());
