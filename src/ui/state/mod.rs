@@ -196,6 +196,13 @@ impl AppState {
         self.recent.truncate(MAX_RECENT);
     }
 
+    /// Puts a scene that was made of the open one below it in the recent list, where it is found again.
+    pub(crate) fn remember_made(&mut self, path: PathBuf) {
+        let open = self.scene.as_ref().map(|scene| scene.path.clone()).filter(|open| self.recent.contains(open));
+        self.remember(path);
+        open.into_iter().for_each(|open| self.remember(open));
+    }
+
     /// True if the Gaussians on screen are a result.
     pub(crate) fn is_trained(&self) -> bool {
         !self.is_training() && (self.training_job.is_some() || self.scene.as_ref().is_some_and(|s| s.trained))
