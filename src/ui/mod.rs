@@ -8,7 +8,6 @@ mod act;
 pub mod actions;
 pub mod app;
 pub(crate) mod camera;
-mod change_texts;
 pub(crate) mod chat;
 mod chat_lines;
 mod chat_model;

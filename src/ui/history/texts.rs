@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use super::history::ViewState;
+use super::ViewState;
 use crate::jobs::edit::EditRequest;
 use crate::jobs::rearrange::{Placement, SplatEdit};
 use crate::math::format::{count, things};

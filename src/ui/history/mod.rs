@@ -4,11 +4,13 @@
 //! No code reports a change. The window's state is compared with the last snapshot whenever it is at rest, so a drag or
 //! a name that is typed is one change.
 
+pub(super) mod texts;
+
 use std::collections::BTreeSet;
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use super::change_texts::described;
+use self::texts::described;
 use crate::agent::scene::UndoneRequest;
 use crate::jobs::edit::EditRequest;
 use crate::jobs::rearrange::SplatEdit;
