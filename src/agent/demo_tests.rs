@@ -155,5 +155,13 @@ fn what_is_said_of_the_demo_is_done_or_refused() {
             let reply = session.say(&mut world, text, &mut |_| {}, &AtomicBool::new(false));
             assert_eq!(reply.text, format!("Only {what} drawn now; say 'show everything' for the rest."), "{match_by}");
         }
+        // What is asked is answered first; without a question of that kind the thing is described alone.
+        for (text, begin) in [
+            ("which book is the largest?", "The green book is the largest book. It is an object"),
+            ("describe the green book", "The green book is an object"),
+        ] {
+            let reply = session.say(&mut world, text, &mut |_| {}, &AtomicBool::new(false));
+            assert!(reply.text.starts_with(begin), "{match_by}: {}", reply.text);
+        }
     }
 }

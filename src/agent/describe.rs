@@ -4,6 +4,7 @@ use super::relation::Relation;
 use super::world::World;
 use crate::math::format::{self, capital, short};
 use crate::pipeline::semantics::query::language::relations::{HOLDS, Space};
+use crate::pipeline::semantics::query::language::words::LanguageWords;
 use crate::scene::identity::whole_names::BETWEEN;
 use crate::scene::{IdentityId, Level, NO_IDENTITY};
 
@@ -126,6 +127,22 @@ pub(crate) fn thing(world: &dyn World, id: IdentityId) -> String {
         text += &format!(" It is also called {}.", format::list(&facts.names[1..]));
     }
     text
+}
+
+/// Says which thing is the most of its kind, if a phrase asks for that: "The green book is the largest book."
+pub(crate) fn ranked(world: &dyn World, id: IdentityId, phrase: &str) -> Option<String> {
+    let words = phrase.strip_prefix("the ").unwrap_or(phrase);
+    let is_most = LanguageWords::get().order(words.split_once(' ')?.0).is_some_and(|order| order.superlative);
+    is_most.then(|| format!("{} is the {words}.", capital(&the(world, id))))
+}
+
+/// Joins the description of a thing with a note on how it was found. A note that answers what was asked comes first.
+pub(crate) fn noted(world: &dyn World, id: IdentityId, text: &str, note: &str) -> String {
+    let it = format!("{} is ", capital(&the(world, id)));
+    match note.starts_with(&it) {
+        true => format!("{note} {}", text.replacen(&it, "It is ", 1)),
+        false => format!("{text} {note}"),
+    }
 }
 
 /// Objects in the current view, largest share first.

@@ -19,15 +19,22 @@ pub enum Effect {
     Hidden(Vec<IdentityId>),
     /// A new scene without any of these identities is made.
     Remove(Vec<IdentityId>),
-    /// The last change of hidden identities was undone: these are hidden again.
-    HiddenUndone(Vec<IdentityId>),
     /// The last edit of the user is to be undone.
     Undo,
     Renamed(IdentityId, String),
-    /// The last rename was undone: the identity has this name again.
-    RenameUndone(IdentityId, String),
+    /// The changes of the last request were undone.
+    Undone(UndoneRequest),
     /// The occupied space of the scene was computed.
     Explored(Arc<Explored>),
+}
+
+/// What is as it was before a request.
+#[derive(Clone, Debug, Default)]
+pub struct UndoneRequest {
+    /// Identities that are hidden again; `None` if the request changed none.
+    pub(crate) hidden: Option<Vec<IdentityId>>,
+    /// Names that identities have again, the newest rename first.
+    pub(crate) names: Vec<(IdentityId, String)>,
 }
 
 pub type Emit = Box<dyn FnMut(Effect) + Send>;

@@ -98,7 +98,10 @@ pub(crate) fn check(
     if let Some((target, level)) = wanted {
         match find(world, &target, level, dialog) {
             Resolved::One { id, note: said, by_looks } => {
-                note = said;
+                let asked: &str =
+                    if let (ToolCall::Describe { .. }, Target::Query(words)) = (&call, &target) { words } else { "" };
+                let ranked = describe::ranked(world, id, asked);
+                note = [ranked.unwrap_or_default(), said].join(" ").trim().to_owned();
                 guessed =
                     if let Target::Query(words) = &target { Some(words.clone()).filter(|_| by_looks) } else { None };
                 ids.push(id);
@@ -245,6 +248,7 @@ pub(crate) fn perform(
         Ok(text) if note.is_empty() => (text, None),
         // What was asked is answered first.
         Ok(text) if matches!(call, ToolCall::Locate { .. }) => (format!("{note} {text}"), None),
+        Ok(text) if matches!(call, ToolCall::Describe { .. }) => (describe::noted(world, id, &text, note), None),
         Ok(text) => (format!("{text} {note}"), None),
         Err(refusal) => (refusal.text, Some(refusal.kind)),
     };

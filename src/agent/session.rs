@@ -118,6 +118,7 @@ impl Session {
         }
         self.dialog.marked.clear();
         self.dialog.isolated.clear();
+        world.begin();
         let reply = if cancel.load(Ordering::Relaxed) {
             self.ended(&[], Refusal::new(RefusalKind::Stopped, "Stopped."))
         } else {
@@ -182,6 +183,7 @@ impl Session {
     fn plan(&mut self, world: &mut dyn World, text: &str, sink: &mut ProgressSink<'_>) -> Reply {
         self.dialog.marked.clear();
         self.dialog.isolated.clear();
+        world.begin();
         let (dialog, policy) = (&self.dialog, &self.policy);
         self.planner.start(
             text,

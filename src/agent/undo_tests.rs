@@ -67,7 +67,8 @@ fn a_rename_is_undone_as_one_step_of_the_window() {
     assert_eq!(world.identities().name(1), "lamp");
     let effects = effects.lock().expect("no panic");
     assert!(matches!(&effects[0], Effect::Renamed(1, name) if name == "torch"), "{effects:?}");
-    assert!(matches!(&effects[1], Effect::RenameUndone(1, name) if name == "lamp"), "{effects:?}");
+    let Effect::Undone(undone) = &effects[1] else { panic!("{effects:?}") };
+    assert!(undone.hidden.is_none() && undone.names == [(1, "lamp".to_owned())], "{effects:?}");
 }
 
 #[test]
@@ -87,6 +88,34 @@ fn what_the_user_did_last_is_undone_by_the_window() {
     assert_eq!(world.undo().expect("the user's"), "hid torch");
     assert!(matches!(effects.lock().expect("no panic").last(), Some(Effect::Undo)));
     assert!(world.undo().is_err(), "once");
+}
+
+#[test]
+fn what_one_sentence_does_is_undone_by_one() {
+    let mut identities = Identities::default();
+    for name in ["lamp", "chair", "table"] {
+        identities.add(Level::Object, NO_IDENTITY, vec![name.into()]);
+    }
+    let map = Arc::new(SemanticMap { identities, ..SemanticMap::default() });
+    let (mut world, effects) = world(parts(map, None));
+    let mut session = Session::new(Policy::off(), Box::new(Commands::default()));
+    let mut say = |text: &str| {
+        let reply = session.say(&mut world, text, &mut |_| (), &AtomicBool::new(false));
+        assert!(reply.refused.is_none(), "{}", reply.text);
+        let hidden = |effect: &Effect| match effect {
+            Effect::Hidden(ids) => Some(ids.clone()),
+            Effect::Undone(undone) => undone.hidden.clone(),
+            _ => None,
+        };
+        (reply.text, effects.lock().expect("no panic").iter().rev().find_map(hidden))
+    };
+    assert_eq!(say("hide the lamp").1, Some(vec![1]));
+    assert_eq!(say("show only the chair and the table").1, Some(vec![0, 1]));
+    assert_eq!(say("undo"), ("Undone: showing only chair and table.".into(), Some(vec![1])));
+    // The control: another sentence is another step.
+    assert_eq!(say("undo"), ("Undone: hiding lamp.".into(), Some(vec![])));
+    assert_eq!(say("hide the lamp and the chair").1, Some(vec![1, 2]));
+    assert_eq!(say("undo"), ("Undone: hiding lamp and hiding chair.".into(), Some(vec![])));
 }
 
 #[test]

@@ -114,10 +114,13 @@ pub trait World {
     /// Executes the scheduled removals at the end of a request, all in one new scene.
     fn carry_out(&mut self) {}
 
+    /// Begins a request: what it changes is undone together.
+    fn begin(&mut self) {}
+
     /// Changes the first name of an identity.
     fn rename(&mut self, id: IdentityId, name: &str) -> Result<(), WorldError>;
 
-    /// Undoes the last change and returns its description.
+    /// Undoes the changes of the last request and returns their description.
     fn undo(&mut self) -> Result<String, WorldError>;
 
     /// Writes the Gaussians of an identity to a file and returns its path.

@@ -44,15 +44,20 @@ impl SceneWork {
 
     /// Carries out a decision of the agent that changes more than the view.
     pub(super) fn carry_out(&mut self, effect: &Effect) {
+        let hides = |ids: &[IdentityId]| format!("hides {} of them", ids.len());
         let line = match effect {
             Effect::Fly(flight, _) => {
                 let (length, secs) = (flight.length, flight.seconds);
                 format!("flies {length:.2} units in {secs:.1} s, {} poses", flight.poses.len())
             }
             Effect::Mark(ids) => format!("marks {} of them", ids.len()),
-            Effect::Hidden(ids) | Effect::HiddenUndone(ids) => format!("hides {} of them", ids.len()),
+            Effect::Hidden(ids) => hides(ids),
             Effect::Renamed(id, name) => self.renamed(*id, name),
-            Effect::RenameUndone(id, name) => self.rename_undone(*id, name),
+            Effect::Undone(undone) => {
+                let names = undone.names.iter().map(|(id, name)| self.rename_undone(*id, name));
+                let said: Vec<String> = undone.hidden.iter().map(|ids| hides(ids)).chain(names).collect();
+                said.join(", ")
+            }
             Effect::Remove(ids) => match self.folder.clone() {
                 Some(folder) => self.removed(&folder, ids),
                 None => return,

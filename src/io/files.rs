@@ -240,9 +240,14 @@ pub(crate) fn holds_something(folder: &Path) -> bool {
     fs::read_dir(folder).is_ok_and(|all| all.flatten().any(|e| !hidden(&e)))
 }
 
+/// Returns the path without links and `..`, so that one place has one path; as it is if nothing is there.
+pub(crate) fn real(path: &Path) -> PathBuf {
+    fs::canonicalize(path).unwrap_or_else(|_| path.into())
+}
+
 /// Name of a folder for display, also if its path ends in `.` or `..`.
 pub(crate) fn folder_name(folder: &Path) -> String {
-    let real = fs::canonicalize(folder).unwrap_or_else(|_| folder.into());
+    let real = real(folder);
     text::name(&real.file_name().unwrap_or(real.as_os_str()).to_string_lossy())
 }
 
@@ -258,7 +263,7 @@ pub(crate) fn data_set_name(root: &Path) -> String {
     if !is_usual_name(&name) {
         return name;
     }
-    let real = fs::canonicalize(root).unwrap_or_else(|_| root.into());
+    let real = real(root);
     real.parent().and_then(Path::file_name).map_or(name, |around| text::name(&around.to_string_lossy()))
 }
 

@@ -80,10 +80,11 @@ impl Folders {
 
     /// Name of the photos at `root` for display.
     pub(crate) fn name_of_photos(&self, root: &Path) -> String {
-        let within = root.strip_prefix(&self.data).ok().and_then(|within| within.components().next());
+        let (root, data) = (files::real(root), files::real(&self.data));
+        let within = root.strip_prefix(data).ok().and_then(|within| within.components().next());
         match within.is_some_and(|folder| folder.as_os_str().to_string_lossy().starts_with("demo-")) {
             true => "Demo photos".into(),
-            false => files::data_set_name(root),
+            false => files::data_set_name(&root),
         }
     }
 
@@ -146,13 +147,21 @@ fn is_hidden(path: &Path) -> bool {
 }
 
 /// Returns the folder in `parent` that belongs to `path`: named by its last name and a digest of all of it, so that two
-/// paths with one name do not share it.
+/// paths with one name do not share it, and two paths to one place do.
 fn unique(parent: &Path, path: &Path) -> PathBuf {
-    let path = std::path::absolute(path).unwrap_or_else(|_| path.to_path_buf());
-    let name = path.file_name().map_or_else(|| "scene".into(), |n| n.to_string_lossy().into_owned());
-    let digest = Sha256::digest(path.as_os_str().as_encoded_bytes());
-    let sum = files::hex(&digest[..8]);
-    files::renamed(parent.join(format!("{name}-{sum}")), parent.join(first_name(&name, &path)))
+    let typed = std::path::absolute(path).unwrap_or_else(|_| path.to_path_buf());
+    let named = |path: &Path| {
+        let name = last_name(path);
+        let digest = Sha256::digest(path.as_os_str().as_encoded_bytes());
+        parent.join(format!("{name}-{}", files::hex(&digest[..8])))
+    };
+    // Earlier versions named it by the path as it was typed.
+    let now = files::renamed(named(&files::real(&typed)), named(&typed));
+    files::renamed(now, parent.join(first_name(&last_name(&typed), &typed)))
+}
+
+fn last_name(path: &Path) -> String {
+    path.file_name().map_or_else(|| "scene".into(), |n| n.to_string_lossy().into_owned())
 }
 
 /// Returns the first version's name of the folder, by a digest that the standard library does not promise to keep.
@@ -174,6 +183,28 @@ mod tests {
         assert_ne!(a, b);
         assert_eq!(a, places.trained(Path::new("/one/fox")));
         assert!(a.to_string_lossy().contains("fox-"));
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn one_place_has_one_folder_by_whichever_path() {
+        let folder = tempfile::tempdir().expect("folder");
+        let folders = Folders { data: folder.path().join("data") };
+        let (photos, link) = (folder.path().join("fox"), folder.path().join("link"));
+        fs::create_dir(&photos).expect("created");
+        std::os::unix::fs::symlink(&photos, &link).expect("linked");
+        let own = folders.fresh(&photos);
+        assert_eq!(own, folders.fresh(&folder.path().join("fox/../fox")), "as scenes refer to it");
+        assert_eq!(own, folders.fresh(&link));
+        let other = folder.path().join("other/fox");
+        fs::create_dir_all(&other).expect("created");
+        assert_ne!(own, folders.fresh(&other), "the control: another place of this name");
+        // What an earlier version named by the link is found.
+        let typed = Sha256::digest(link.as_os_str().as_encoded_bytes());
+        let old = folders.data.join("trained").join(format!("link-{}", files::hex(&typed[..8]))).join("run-1");
+        fs::create_dir_all(old).expect("created");
+        assert_eq!(folders.trainings(&link), std::slice::from_ref(&own));
+        assert_eq!(folders.trainings(&photos), [own]);
     }
 
     #[test]

@@ -138,9 +138,11 @@ fn delete_with(
     run: &Path,
     delete: impl FnOnce(&Path) -> Result<(), IoError>,
 ) -> Result<(), JobError> {
+    // Its name is that of the place, which is known as long as something is there.
+    let picture = folders.picture(run);
     delete(run)?;
     // A picture of nothing is not shown.
-    let _ = fs::remove_file(folders.picture(run));
+    let _ = fs::remove_file(picture);
     Ok(())
 }
 

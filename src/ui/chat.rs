@@ -77,6 +77,8 @@ pub(crate) struct Chat {
     typed: String,
     lines: Vec<Line>,
     thread: Option<(Sender<Request>, Receiver<News>)>,
+    /// Number of sentences sent so far.
+    pub(crate) sent: u64,
     /// Set to cancel the running request; `Some` while one runs.
     cancel: Option<Arc<AtomicBool>>,
     /// The conversation so far, as JSON and as Markdown.
@@ -155,6 +157,7 @@ impl Chat {
         let sent = self.thread.as_ref().is_some_and(|(sender, _)| sender.try_send(request).is_ok());
         if sent {
             self.cancel = Some(cancel);
+            self.sent += 1;
         } else {
             self.answer("The agent could not be started; please try again.");
         }
@@ -276,7 +279,7 @@ impl PaneContents for Chat {
             let has_lines = self.cancel.is_none() && !self.lines.is_empty();
             let new = ui.add_enabled(has_lines, Button::new("New").small());
             if new.on_hover_text("New conversation").accessible_name("New conversation").clicked() {
-                *self = Self::default();
+                *self = Self { sent: self.sent, ..Self::default() };
             }
         });
         self.below_pt = ui.cursor().top() - below;

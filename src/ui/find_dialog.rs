@@ -85,7 +85,7 @@ impl FindDialog {
             // A dialog gets little height before the size of its content is known.
             let list_pt = (room.y - 230.0).max(120.0);
             ScrollArea::vertical().max_height(list_pt).min_scrolled_height(list_pt).show(ui, |ui| {
-                self.choices(ui, known, &means);
+                self.choices(ui, known, &means, cx);
                 self.engine(ui, known, &means);
             });
             ui.add_space(6.0);
@@ -119,7 +119,7 @@ impl FindDialog {
         known.is_fast || !known.is_settled && !self.without_engine && missing_engine(known).is_some()
     }
 
-    fn choices(&mut self, ui: &mut Ui, known: &ModelList, means: &Means) {
+    fn choices(&mut self, ui: &mut Ui, known: &ModelList, means: &Means, cx: &mut Ctx<'_>) {
         ui.add_space(6.0);
         ui.label(RichText::new("Segmenter").strong());
         let text = "Rough: an object of two colors is split, neighbors of one color are merged.";
@@ -128,6 +128,11 @@ impl FindDialog {
         }
         if let Some(id) = networks(ui, known, self.is_fast(known), ModelRole::Segmenter, &means.segmenter) {
             self.segmenter = Some(id);
+        }
+        let masks = ui.button("Masks from files\u{2026}").on_hover_text(Action::ChooseMasks.tooltip());
+        if masks.clicked() {
+            cx.ask(Action::ChooseMasks);
+            self.open = false;
         }
         ui.add_space(8.0);
         ui.label(RichText::new("Text encoder").strong());

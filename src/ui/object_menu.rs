@@ -6,7 +6,7 @@ use super::ctx::Ctx;
 use super::keys;
 use crate::navigate::target::Side;
 use crate::pipeline::semantics::lifting::edit::Edit;
-use crate::scene::{Identities, IdentityId, text};
+use crate::scene::{Identities, IdentityId, NO_IDENTITY, text};
 use crate::ui::actions::Action;
 
 /// Row of the menu.
@@ -59,6 +59,16 @@ pub(crate) fn named_actions(thing: MenuThing<'_>) -> Vec<(Action, String)> {
         Row::MergeInto | Row::Line => None,
     };
     rows(thing).into_iter().filter_map(named).collect()
+}
+
+/// Actions on a thing as they are listed while none is chosen: "Remove and fill".
+pub(crate) fn unnamed_actions() -> Vec<(Action, String)> {
+    let all = Identities::default();
+    let named = |row| match row {
+        Row::Do(action, text, _) => Some((action, text.trim_end_matches('\u{2026}').to_owned())),
+        Row::MergeInto | Row::Line => None,
+    };
+    rows(MenuThing { all: &all, id: NO_IDENTITY, is_hidden: false }).into_iter().filter_map(named).collect()
 }
 
 /// The action with a key that does the same as this one of the selected thing.

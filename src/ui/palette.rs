@@ -8,11 +8,25 @@ use super::object_menu::{self, MenuThing};
 use super::theme;
 use crate::ui::actions::Action;
 
+/// What is to be done before an action on an object can be.
+const SELECT_FIRST: &str = "Select an object first: click it in the view, or press N.";
+
 #[derive(Default)]
 pub(crate) struct Palette {
     open: bool,
     query: String,
     selected: usize,
+    /// True if the action that was chosen last needs an object, and none is selected.
+    needs_object: bool,
+}
+
+/// An action that is found.
+#[derive(Clone, Debug, PartialEq)]
+struct PaletteRow {
+    action: Action,
+    title: String,
+    /// True if it needs an object, and none is selected.
+    needs_object: bool,
 }
 
 impl Palette {
@@ -57,13 +71,11 @@ impl Palette {
                 .desired_width(f32::INFINITY);
             let edit = ui.add(edit).accessible_name("Search actions");
             if edit.changed() {
-                self.selected = 0;
+                (self.selected, self.needs_object) = (0, false);
             }
             let found = matches(&self.query, layout, selection);
             self.selected = self.selected.min(found.len().saturating_sub(1));
-            if entered {
-                chosen = found.get(self.selected).map(|(action, _)| action.clone());
-            }
+            let mut taken = found.get(self.selected).filter(|_| entered);
             ui.add_space(4.0);
             // The window remembers its last height, which the list must not be held to.
             let height = (ctx.content_rect().height() - 220.0).clamp(120.0, 380.0);
@@ -72,8 +84,13 @@ impl Palette {
                 if found.is_empty() {
                     ui.weak("No matching action.");
                 }
-                for (i, (action, title)) in found.iter().enumerate() {
+                for (i, found) in found.iter().enumerate() {
+                    let PaletteRow { action, title, needs_object } = found;
                     let keyed = selection.and_then(|thing| object_menu::keyed(thing, action));
+                    let title = match needs_object {
+                        true => RichText::new(format!("{title}  \u{b7}  select an object first")).color(theme::weak()),
+                        false => RichText::new(title),
+                    };
                     let row = egui::Button::selectable(i == self.selected, title)
                         .shortcut_text(keys::label(ui.ctx(), keyed.as_ref().unwrap_or(action)))
                         .min_size(egui::vec2(ui.available_width(), 28.0));
@@ -82,10 +99,18 @@ impl Palette {
                         row.scroll_to_me(None);
                     }
                     if row.clicked() {
-                        chosen = Some(action.clone());
+                        taken = Some(found);
                     }
                 }
             });
+            if let Some(PaletteRow { action, needs_object, .. }) = taken {
+                self.needs_object = *needs_object;
+                chosen = Some(action.clone()).filter(|_| !needs_object);
+            }
+            if self.needs_object {
+                ui.add_space(4.0);
+                ui.label(RichText::new(SELECT_FIRST).color(theme::warning()));
+            }
         });
         if chosen.is_some() || response.should_close() {
             self.open = false;
@@ -107,36 +132,40 @@ fn title(action: &Action) -> String {
 }
 
 /// Actions whose titles hold every word of the query: those that begin with it, then those with words that begin so, then
-/// those with the letters anywhere. A query that looks like a path gives only the action that opens it.
-fn matches(query: &str, layout: &Layout, selection: Option<MenuThing<'_>>) -> Vec<(Action, String)> {
+/// those with the letters anywhere. A query that looks like a path gives only the action that opens it. Without a
+/// selection, actions on one are found by their names, too.
+fn matches(query: &str, layout: &Layout, selection: Option<MenuThing<'_>>) -> Vec<PaletteRow> {
     let path = query.trim();
     if path.starts_with(['/', '.', '~']) || path.contains(":\\") {
         let home = path.strip_prefix("~/").and_then(|rest| Some(std::env::home_dir()?.join(rest)));
         let open = Action::Open(home.unwrap_or_else(|| path.into()));
         let title = title(&open);
-        return vec![(open, title)];
+        return vec![PaletteRow { action: open, title, needs_object: false }];
     }
     let query = path.to_lowercase();
     let words: Vec<&str> = query.split_whitespace().collect();
     let can_be_done = |a: &Action| !matches!(a, Action::TogglePane(pane) if !layout.shows(*pane));
-    let is_asked_for = |(action, title): &(Action, String)| {
+    let is_asked_for = |PaletteRow { action, title, .. }: &PaletteRow| {
         let title = format!("{} {}", title.to_lowercase(), other_words(action));
         words.iter().all(|w| title.contains(w))
     };
+    let row = |needs_object| move |(action, title)| PaletteRow { action, title, needs_object };
     let of_selection = selection.map(object_menu::named_actions).unwrap_or_default();
-    let of_window = Action::all().into_iter().filter(can_be_done).map(|a| {
-        let title = title(&a);
-        (a, title)
+    let of_window = Action::all().into_iter().filter(can_be_done).map(|action| {
+        let needs_object = selection.is_none() && acts_on_selection(&action);
+        PaletteRow { title: title(&action), action, needs_object }
     });
-    let mut found: Vec<(Action, String)> = of_selection.into_iter().filter(is_asked_for).collect();
+    let of_none = if selection.is_none() && !words.is_empty() { object_menu::unnamed_actions() } else { Vec::new() };
+    let mut found: Vec<PaletteRow> = of_selection.into_iter().map(row(false)).filter(is_asked_for).collect();
     let selected = found.len();
     found.extend(of_window.filter(is_asked_for));
+    found.extend(of_none.into_iter().map(row(true)).filter(is_asked_for));
     // The name of a pane is most likely a request for that pane.
     let is_pane = |a: &Action| match a {
         Action::ShowPane(pane) | Action::TogglePane(pane) => pane.text().to_lowercase().starts_with(&query),
         _ => false,
     };
-    let rank = |(at, (action, title)): &(usize, (Action, String))| {
+    let rank = |(at, PaletteRow { action, title, .. }): &(usize, PaletteRow)| {
         let title = title.to_lowercase();
         if title.starts_with(&query) || is_pane(action) {
             return 0;
@@ -151,6 +180,11 @@ fn matches(query: &str, layout: &Layout, selection: Option<MenuThing<'_>>) -> Ve
     let mut found: Vec<_> = found.into_iter().enumerate().collect();
     found.sort_by_key(rank);
     found.into_iter().map(|(_, found)| found).collect()
+}
+
+/// True if a plain action does something to the selected object.
+fn acts_on_selection(action: &Action) -> bool {
+    matches!(action, Action::IsolateSelected | Action::HideSelected | Action::GoToSelected | Action::Rename)
 }
 
 /// True if one of the words of a text begins with these letters.
@@ -234,7 +268,7 @@ mod tests {
     }
 
     fn found(query: &str) -> Vec<Action> {
-        matches(query, &Layout::default(), None).into_iter().map(|(action, _)| action).collect()
+        matches(query, &Layout::default(), None).into_iter().map(|row| row.action).collect()
     }
 
     #[test]
@@ -243,7 +277,7 @@ mod tests {
         let mug = all.add(Level::Object, NO_IDENTITY, vec!["mug".into()]);
         let titles = |query: &str| {
             let found = matches(query, &Layout::default(), Some(thing(&all, mug, false)));
-            found.into_iter().map(|(_, title)| title).collect::<Vec<_>>()
+            found.into_iter().map(|row| row.title).collect::<Vec<_>>()
         };
         assert_eq!(titles("")[0], "Go there: mug");
         assert_eq!(titles("").len(), found("").len() + object_menu::named_actions(thing(&all, mug, false)).len());
@@ -257,10 +291,29 @@ mod tests {
         ] {
             assert_eq!(titles(query)[0], title, "{query}");
         }
-        assert!(found("recolor").is_empty(), "nothing is selected");
         let hides = |is_hidden| matches("mug", &Layout::default(), Some(thing(&all, mug, is_hidden))).into_iter();
-        let title = |is_hidden| hides(is_hidden).find(|(action, _)| *action == Action::Hide(mug)).expect("there").1;
+        let title = |is_hidden| hides(is_hidden).find(|row| row.action == Action::Hide(mug)).expect("there").title;
         assert_eq!([title(false), title(true)], ["Hide: mug", "Show: mug"], "what it does now");
+    }
+
+    #[test]
+    fn without_a_selection_what_needs_one_is_found_but_cannot_be_done() {
+        let first = |query: &str| matches(query, &Layout::default(), None).swap_remove(0);
+        for (query, title) in
+            [("move", "Move, turn or recolor"), ("recolor", "Move, turn or recolor"), ("dissolve", "Dissolve")]
+        {
+            let row = first(query);
+            assert_eq!((row.title.as_str(), row.needs_object), (title, true), "{query}");
+        }
+        assert!(matches("hide selection", &Layout::default(), None).iter().all(|row| row.needs_object));
+        // Controls: what needs none, and a selection.
+        assert!(!first("undo").needs_object);
+        let mut all = Identities::default();
+        let mug = all.add(Level::Object, NO_IDENTITY, vec!["mug".into()]);
+        for query in ["move", "hide selection", ""] {
+            let found = matches(query, &Layout::default(), Some(thing(&all, mug, false)));
+            assert!(found.iter().all(|row| !row.needs_object), "{query}");
+        }
     }
 
     #[test]
@@ -280,7 +333,8 @@ mod tests {
     fn the_beginning_of_a_word_beats_letters_within_one() {
         let mut all = Identities::default();
         let mug = all.add(Level::Object, NO_IDENTITY, vec!["mug".into()]);
-        let first = |query: &str| matches(query, &Layout::default(), Some(thing(&all, mug, false))).swap_remove(0).1;
+        let first =
+            |query: &str| matches(query, &Layout::default(), Some(thing(&all, mug, false))).swap_remove(0).title;
         for (query, title) in [
             ("top", "Look from the top"),
             ("help", "Guide"),
@@ -299,9 +353,9 @@ mod tests {
             assert_eq!(first(query), title, "{query}");
         }
         let of = |query: &str| matches(query, &Layout::default(), Some(thing(&all, mug, false)));
-        assert!(of("delete").iter().any(|(action, _)| *action == Action::Remove(mug)));
+        assert!(of("delete").iter().any(|row| row.action == Action::Remove(mug)));
         // Control: letters within words are found, too, at the end.
-        assert_eq!(of("top").last().map(|(action, _)| action), Some(&Action::EndComparison));
+        assert_eq!(of("top").last().map(|row| &row.action), Some(&Action::EndComparison));
     }
 
     #[test]

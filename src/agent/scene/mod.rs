@@ -6,14 +6,15 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use super::camera_args::{Direction, Distance};
-pub use super::effect::Effect;
 use super::effect::Emit;
+pub use super::effect::{Effect, UndoneRequest};
 use super::relation::Viewpoint;
 pub use super::view_shares::AgentScene;
 use super::view_shares::ViewShares;
 use super::world::{Arrival, IdentityFacts, Movement, QueryPlace, Unreachable, World, WorldError};
 use crate::jobs::query::QueryEngine;
 use crate::jobs::{export, export_splat, render};
+use crate::math::format;
 use crate::navigate::Pose;
 use crate::navigate::target::Side;
 use crate::pipeline::observer::Silent;
@@ -31,7 +32,10 @@ pub struct SceneWorld {
     hidden: Vec<bool>,
     marked: Vec<IdentityId>,
     shares: ViewShares,
-    done: UndoHistory<Before>,
+    /// States before the changes of each request, oldest first.
+    done: UndoHistory<Vec<Before>>,
+    /// True if the request that runs has changed something.
+    has_changed: bool,
     /// Last edit of the user, which the window can undo.
     pub(crate) undoable: Option<String>,
     /// Identities to remove at the end of the request: one new scene lacks all of them.
@@ -41,7 +45,8 @@ pub struct SceneWorld {
 
 /// State before a change, with a description of the change.
 enum Before {
-    Hidden(Vec<bool>, String),
+    /// The last one is true if what was hidden or shown before does not matter any more.
+    Hidden(Vec<bool>, String, bool),
     Named(Arc<SemanticMap>, IdentityId, String),
     Eye(Pose, String),
 }
@@ -66,6 +71,7 @@ impl SceneWorld {
             marked: Vec::new(),
             shares: ViewShares::default(),
             done: UndoHistory::default(),
+            has_changed: false,
             removing: Vec::new(),
             undoable: None,
             emit,
@@ -139,9 +145,17 @@ impl SceneWorld {
         (0..).zip(&self.hidden).filter(|(_, hidden)| **hidden).map(|(id, _)| id).collect()
     }
 
-    fn set_hidden_list(&mut self, hidden: Vec<bool>, what: String) {
+    /// Records the state before a change: those of one request are undone together.
+    fn record(&mut self, before: Before) {
+        let goes_on = std::mem::replace(&mut self.has_changed, true);
+        let mut request = if goes_on { self.done.take() } else { None }.unwrap_or_default();
+        request.push(before);
+        self.done.record(request);
+    }
+
+    fn set_hidden_list(&mut self, hidden: Vec<bool>, what: String, is_of_all: bool) {
         let before = std::mem::replace(&mut self.hidden, hidden);
-        self.done.record(Before::Hidden(before, what));
+        self.record(Before::Hidden(before, what, is_of_all));
         let hidden = self.hidden_list();
         (self.emit)(Effect::Hidden(hidden));
     }
@@ -219,7 +233,7 @@ impl World for SceneWorld {
         let inside: Vec<_> = ids.iter().map(|id| self.parts.map.identities.descendants(*id)).collect();
         let hidden = (0..self.hidden.len()).map(|i| !inside.iter().any(|of| of.get(i) == Some(&true))).collect();
         let names: Vec<String> = ids.iter().map(|id| self.name(*id)).collect();
-        self.set_hidden_list(hidden, format!("showing only {}", names.join(", ")));
+        self.set_hidden_list(hidden, format!("showing only {}", format::list(&names)), true);
         Ok(())
     }
 
@@ -229,12 +243,12 @@ impl World for SceneWorld {
         let now = |(inside, hidden): (bool, &bool)| if inside { hide } else { *hidden };
         let hidden = all.descendants(id).into_iter().zip(&self.hidden).map(now).collect();
         let what = format!("{} {}", if hide { "hiding" } else { "showing" }, self.name(id));
-        self.set_hidden_list(hidden, what);
+        self.set_hidden_list(hidden, what, false);
         Ok(())
     }
 
     fn show_all(&mut self) -> Result<(), WorldError> {
-        self.set_hidden_list(vec![false; self.hidden.len()], "showing everything".into());
+        self.set_hidden_list(vec![false; self.hidden.len()], "showing everything".into(), true);
         Ok(())
     }
 
@@ -252,13 +266,17 @@ impl World for SceneWorld {
         }
     }
 
+    fn begin(&mut self) {
+        self.has_changed = false;
+    }
+
     fn rename(&mut self, id: IdentityId, name: &str) -> Result<(), WorldError> {
         let before = Arc::clone(&self.parts.map);
         let map = Arc::make_mut(&mut self.parts.map);
         let identity = map.identities.get(id).ok_or_else(|| WorldError(format!("there is no #{id}")))?;
         let (name, old) = (text::name(name), identity.names.first().cloned().unwrap_or_default());
         map.identities.rename(id, &name);
-        self.done.record(Before::Named(before, id, old));
+        self.record(Before::Named(before, id, old));
         (self.emit)(Effect::Renamed(id, name));
         Ok(())
     }
@@ -269,26 +287,42 @@ impl World for SceneWorld {
             (self.emit)(Effect::Undo);
             return Ok(what);
         };
-        match done {
-            Before::Hidden(hidden, what) => {
-                self.hidden = hidden;
-                let hidden = self.hidden_list();
-                (self.emit)(Effect::HiddenUndone(hidden));
-                Ok(what)
-            }
-            Before::Named(map, id, old) => {
-                self.parts.map = map;
-                let name = self.parts.map.identities.name(id);
-                (self.emit)(Effect::RenameUndone(id, old));
-                Ok(format!("it is \u{201c}{name}\u{201d} again"))
-            }
-            Before::Eye(eye, what) => {
-                moves::straight(self, eye, String::new()).map_err(|e| WorldError(e.reason))?;
-                // The flight back must not be undone itself.
-                self.done.take();
-                Ok(what)
+        self.has_changed = false;
+        let (mut undone, mut eye) = (UndoneRequest::default(), None);
+        let mut said: Vec<(String, bool)> = Vec::new();
+        for before in done.into_iter().rev() {
+            match before {
+                Before::Hidden(hidden, what, is_of_all) => {
+                    self.hidden = hidden;
+                    // What the request had hidden before a later step chose what to draw was not seen.
+                    let is_outdated = said.iter().any(|(_, is_of_all)| *is_of_all);
+                    undone.hidden = Some(self.hidden_list());
+                    if !is_outdated {
+                        said.push((what, is_of_all));
+                    }
+                }
+                Before::Named(map, id, old) => {
+                    self.parts.map = map;
+                    said.push((format!("it is \u{201c}{}\u{201d} again", self.parts.map.identities.name(id)), false));
+                    undone.names.push((id, old));
+                }
+                Before::Eye(pose, what) => {
+                    eye = Some(pose);
+                    said.push((what, false));
+                }
             }
         }
+        if undone.hidden.is_some() || !undone.names.is_empty() {
+            (self.emit)(Effect::Undone(undone));
+        }
+        if let Some(eye) = eye {
+            moves::straight(self, eye, String::new()).map_err(|e| WorldError(e.reason))?;
+            // The flight back must not be undone itself.
+            self.done.take();
+            self.has_changed = false;
+        }
+        let said: Vec<String> = said.into_iter().rev().map(|(what, _)| what).collect();
+        Ok(format::list(&said))
     }
 
     fn export(&mut self, id: IdentityId) -> Result<String, WorldError> {

@@ -119,7 +119,7 @@ pub(super) fn straight(scene: &mut SceneWorld, to: Pose, what: String) -> Result
 }
 
 fn fly(scene: &mut SceneWorld, flight: CameraTrajectory, about: Option<DVec3>, what: String) {
-    scene.done.record(Before::Eye(scene.eye, what));
+    scene.record(Before::Eye(scene.eye, what));
     if let Some(last) = flight.poses.last() {
         scene.eye = *last;
     }

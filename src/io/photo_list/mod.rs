@@ -114,11 +114,11 @@ pub(super) fn photos(
     // Two photos listed under different names cannot both be one file: one name only resembles that of the file.
     let mut users: HashMap<PathBuf, Vec<String>> = HashMap::new();
     for (l, _, file, _) in &found {
-        users.entry(real(&file.path)).or_default().push(l.listed_as());
+        users.entry(files::real(&file.path)).or_default().push(l.listed_as());
     }
     let mut photos: Vec<Photo> = Vec::new();
     for (l, photo, file, normalized) in found {
-        let of_file = users.get(&real(&file.path)).map_or(&[][..], Vec::as_slice);
+        let of_file = users.get(&files::real(&file.path)).map_or(&[][..], Vec::as_slice);
         let other = of_file.iter().find(|name| **name != l.listed_as());
         if let (Some(called), Some(other)) = (&file.called, other) {
             tally.shared.push([l.listed_as(), other.clone(), called.clone()]);
@@ -151,10 +151,6 @@ pub(super) fn photos(
     warnings.extend(tally.warnings(source));
     warnings.extend(lenses::warnings(&photos));
     Ok(photos)
-}
-
-fn real(path: &Path) -> PathBuf {
-    fs::canonicalize(path).unwrap_or_else(|_| path.into())
 }
 
 fn fate(l: &ListedPhoto, finder: &PhotoFinder<'_>, source: &Path) -> Result<Fate, IoError> {

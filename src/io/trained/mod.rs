@@ -35,10 +35,9 @@ pub struct TrainedScene {
 }
 
 impl TrainedScene {
-    /// Folder of the photos, if the scene has a reference and the folder still exists.
+    /// Folder of the photos, if the scene has a reference and the folder still exists: the same path from every scene.
     pub(crate) fn dataset_path(&self) -> Option<PathBuf> {
-        let path = self.folder.join(&self.info.dataset.as_ref()?.path);
-        path.exists().then_some(path)
+        std::fs::canonicalize(self.folder.join(&self.info.dataset.as_ref()?.path)).ok()
     }
 }
 

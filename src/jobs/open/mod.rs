@@ -13,7 +13,7 @@ use crate::io::labels::Labels;
 use crate::io::results::{Method, MethodResult};
 use crate::io::scene_files::CHECKPOINT_FILE;
 use crate::io::trained::{self, History, SceneCamera};
-use crate::io::{self, Opened, TrainedScene};
+use crate::io::{self, Opened, TrainedScene, files};
 use crate::pipeline::observer::{Observer, Severity};
 use crate::pipeline::semantics::query::foreign::identities::{USUAL_SCALE, semantic_map};
 use crate::pipeline::train::TrainConfig;
@@ -278,6 +278,13 @@ impl OpenedScene {
     pub(crate) fn trained_in(&self, out: &Path) -> Self {
         let out = if self.remote.is_some() { &self.out } else { out };
         Self { out: out.into(), known_held_out: None, ..self.clone() }
+    }
+
+    /// Returns whether both are of the same photos on this computer.
+    pub(crate) fn has_photos_of(&self, other: &Self) -> bool {
+        let place =
+            |scene: &Self| Some(files::real(scene.dataset.as_ref().filter(|_| scene.remote.is_none())?.source()));
+        place(self).is_some_and(|own| place(other) == Some(own))
     }
 
     /// Length of a unit in meters, if it is known of the scene or of its photos.

@@ -43,9 +43,10 @@ pub(in crate::ui) fn add_segment(app: &mut App) {
     }
 }
 
-/// Begins moving, turning or recoloring an identity.
+/// Begins moving, turning or recoloring an identity, which becomes the selection: outline and list show what changes.
 pub(in crate::ui) fn transform(app: &mut App, id: IdentityId) {
     if !view::is_empty(app, id) {
+        app.viewport.picking.select(Some(id));
         app.viewport.transform(id, &app.state);
     }
 }

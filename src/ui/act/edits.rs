@@ -4,6 +4,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use super::remote;
+use crate::agent::scene::UndoneRequest;
 use crate::jobs::JobError;
 use crate::jobs::edit::{self, EditRequest};
 use crate::jobs::rearrange::{RearrangeRequest, SplatChange, SplatEdit};
@@ -15,7 +16,8 @@ use crate::scene::identity::whole_names::BETWEEN;
 use crate::scene::{Identities, IdentityId, Level};
 use crate::ui::app::App;
 use crate::ui::context::SceneContext;
-use crate::ui::history::{EditSnapshot, EditStep, Editing, ViewState, edit_text, splat_edit_text};
+use crate::ui::history::texts::{edit_text, splat_edit_text};
+use crate::ui::history::{EditSnapshot, EditStep, Editing, ViewState};
 use crate::ui::labels::sentence;
 use crate::ui::state::Tone;
 use crate::worker::{JobInfo, Stop};
@@ -39,29 +41,37 @@ pub(in crate::ui) fn next(app: &mut App) {
         }
         settle(app, true);
         match step {
-            EditStep::Request(request) => apply(app, request),
+            EditStep::Request(request) => apply(app, request, None),
+            EditStep::Said(request, sentence) => apply(app, request, Some(sentence)),
             EditStep::Rearrange(edit) => rearrange(app, edit),
             EditStep::Undo => go_in_history(app, false),
             EditStep::Redo => go_in_history(app, true),
-            // If the user has changed something since, only the agent's change is undone.
-            EditStep::UndoRename(id, name) if was(app, |s| s.is_called(id, &name)) => go_in_history(app, false),
-            EditStep::UndoRename(id, name) => apply(app, EditRequest::Apply(Edit::Rename(id, name))),
-            EditStep::UndoHidden(ids) if was(app, |s| s.view.hidden.iter().eq(&ids)) => go_in_history(app, false),
-            EditStep::UndoHidden(ids) => app.viewport.visibility.set_hidden(ids),
+            EditStep::UndoSentence(undone) => undo_sentence(app, undone),
         }
     }
 }
 
-/// True if the state that undo leads to satisfies `like`.
-fn was(app: &App, like: impl Fn(&EditSnapshot) -> bool) -> bool {
-    app.state.changes.before().is_some_and(like)
+/// Undoes the changes of a sentence of the chat. If the user has changed something since, only these.
+fn undo_sentence(app: &mut App, undone: UndoneRequest) {
+    let UndoneRequest { hidden, names } = undone;
+    let is_like = |before: &EditSnapshot| {
+        hidden.as_ref().is_none_or(|ids| before.view.hidden.iter().eq(ids))
+            && names.iter().all(|(id, name)| before.is_called(*id, name))
+    };
+    if app.state.changes.before().is_some_and(is_like) {
+        return go_in_history(app, false);
+    }
+    hidden.into_iter().for_each(|ids| app.viewport.visibility.set_hidden(ids));
+    let scene = app.state.scene_number;
+    let rename = |(id, name)| (scene, EditStep::Request(EditRequest::Apply(Edit::Rename(id, name))));
+    names.into_iter().map(rename).rev().for_each(|step| app.edits.push_front(step));
 }
 
-fn apply(app: &mut App, request: EditRequest) {
+fn apply(app: &mut App, request: EditRequest, number: Option<u64>) {
     let none = Identities::default();
     let all = app.state.semantics.as_ref().map_or(&none, |map| &map.identities);
     let what = Some(edit_text(&request, all));
-    start_edit(app, request, None, Editing { what, redo: false });
+    start_edit(app, request, None, Editing { what, redo: false, sentence: number });
 }
 
 /// Starts a change of objects and parts, which is stored in the folder `also`, too. Returns false if it is impossible.
@@ -107,7 +117,7 @@ fn rearrange(app: &mut App, edit: SplatEdit) {
     let none = Identities::default();
     let all = app.state.semantics.as_ref().map_or(&none, |map| &map.identities);
     let what = Some(splat_edit_text(&edit, all));
-    start_rearrangement(app, SplatChange::Apply(edit), Editing { what, redo: false });
+    start_rearrangement(app, SplatChange::Apply(edit), Editing { what, redo: false, sentence: None });
 }
 
 /// Starts a change of Gaussians. Returns false if it is impossible.
@@ -180,7 +190,7 @@ fn record(app: &mut App, editing: Editing) {
         }
     }
     // A refused or failed edit was reported and leaves nothing to undo.
-    if let Some(what) = app.state.changes.settle(&snapshot(app), Some(&what)) {
+    if let Some(what) = app.state.changes.settle_as(&snapshot(app), Some(&what), editing.sentence) {
         let copy = app.state.copied.take().map(|name| format!(". Changes go to a copy, \u{201c}{name}\u{201d}."));
         app.state.toast(Tone::Good, sentence(&what) + &copy.unwrap_or_default());
         if !emptied.is_empty() {
@@ -210,7 +220,7 @@ fn go_in_history(app: &mut App, redo: bool) {
     };
     if !app.state.changes.has(&snapshot(app)) {
         let now = app.viewport.cloud().map(|cloud| Arc::clone(cloud));
-        let editing = Editing { what: None, redo };
+        let editing = Editing { what: None, redo, sentence: None };
         // A change that was made in the scene before a copy was derived from it is stored there.
         let out = app.state.scene.as_ref().map(|scene| scene.out.clone());
         let also = Some(to.folder).filter(|folder| Some(folder) != out.as_ref());
@@ -271,6 +281,11 @@ pub(in crate::ui) fn snapshot(app: &App) -> EditSnapshot {
 /// Records changes since the last call in the history, unless objects and parts are about to change. Camera path,
 /// crop box and measurements only `at_rest`: without a drag or typing in progress.
 pub(in crate::ui) fn settle(app: &mut App, at_rest: bool) {
+    settle_as(app, at_rest, None);
+}
+
+/// Records what the chat's sentence of this `number` has changed just now.
+pub(in crate::ui) fn settle_as(app: &mut App, at_rest: bool, number: Option<u64>) {
     if app.editing.is_some() {
         return;
     }
@@ -281,7 +296,7 @@ pub(in crate::ui) fn settle(app: &mut App, at_rest: bool) {
         now.view.measurements.clone_from(&before.view.measurements);
     }
     let shown = before.is_some_and(|before| before.view.hidden != now.view.hidden);
-    let Some(what) = app.state.changes.settle(&now, None) else { return };
+    let Some(what) = app.state.changes.settle_as(&now, None, number) else { return };
     match shown {
         true => app.state.toast(Tone::Info, sentence(&what)),
         false => app.state.say(Tone::Info, sentence(&what)),

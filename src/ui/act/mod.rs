@@ -16,6 +16,7 @@ pub(super) mod open;
 pub(super) mod query;
 pub(super) mod remote;
 pub(super) mod runs;
+mod tool_change;
 pub(super) mod train;
 pub(super) mod view;
 pub(super) mod window;
@@ -33,6 +34,7 @@ macro_rules! define_act {
         /// Carries out an action.
         #[allow(unused_variables)]
         pub(super) fn act(action: Action, $app: &mut App, $ctx: &egui::Context) {
+            let Some(action) = tool_change::checked(action, $app) else { return };
             match action {
                 $(Action::$name $(($($arg),+))? => { $act; })*
             }

@@ -16,7 +16,7 @@ use crate::ui::camera;
 use crate::ui::dialogs::{DialogAnswer, Question};
 use crate::ui::file_dialogs::{FileFormat, FileRequest};
 use crate::ui::file_kind::FileKind;
-use crate::ui::state::{ShownReport, Tone};
+use crate::ui::state::{AppState, ShownReport, Tone};
 use crate::worker::{Failure, JobInfo, Makes};
 
 /// File endings of scenes.
@@ -55,7 +55,7 @@ pub(in crate::ui) fn open(app: &mut App, path: PathBuf) {
             move |observer| workspace.open(&path, observer),
             move |app, opened| match opened {
                 OpenedPath::Scene(scene) => {
-                    if is_kin || app.state.scene.as_ref().is_some_and(|before| is_same_place(before, &scene)) {
+                    if is_kin || is_same_place(&app.state, &scene) {
                         app.viewport.keep_place();
                     }
                     app.state.opened(*scene, false);
@@ -66,9 +66,9 @@ pub(in crate::ui) fn open(app: &mut App, path: PathBuf) {
     });
 }
 
-/// True if both scenes are results of the same photos.
-fn is_same_place(before: &OpenedScene, now: &OpenedScene) -> bool {
-    before.trained && now.trained && before.dataset_path.is_some() && before.dataset_path == now.dataset_path
+/// True if the Gaussians on screen and those of the other scene are results of the same photos.
+fn is_same_place(state: &AppState, now: &OpenedScene) -> bool {
+    state.is_trained() && now.trained && state.scene.as_ref().is_some_and(|before| before.has_photos_of(now))
 }
 
 /// Finds the camera poses of photos, and opens the result.

@@ -218,11 +218,11 @@ pub(in crate::ui) fn effect(app: &mut App, effect: Effect) {
         Effect::Hidden(ids) => app.viewport.visibility.set_hidden(ids),
         Effect::Remove(ids) => objects::remove(app, &ids),
         Effect::Undo => edits::queue(app, EditStep::Undo),
-        Effect::HiddenUndone(ids) => edits::queue(app, EditStep::UndoHidden(ids)),
         Effect::Renamed(id, name) => {
-            edits::queue(app, EditStep::Request(EditRequest::Apply(Edit::Rename(id, name))));
+            let sentence = app.chat.sent;
+            edits::queue(app, EditStep::Said(EditRequest::Apply(Edit::Rename(id, name)), sentence));
         }
-        Effect::RenameUndone(id, name) => edits::queue(app, EditStep::UndoRename(id, name)),
+        Effect::Undone(undone) => edits::queue(app, EditStep::UndoSentence(undone)),
         Effect::Explored(explored) => app.state.explored = Some(explored),
     }
 }

@@ -123,7 +123,8 @@ pub(in crate::ui) fn show_folder(app: &mut App, ctx: &egui::Context, of: Option<
 
 /// Copies the scene's folder to another place.
 pub(in crate::ui) fn save_copy(app: &mut App) {
-    let Some((from, is_stored)) = app.state.scene.as_ref().map(|s| (s.out.clone(), s.is_stored())) else {
+    let scene = app.state.scene.as_ref();
+    let Some((from, is_stored, name)) = scene.map(|s| (s.out.clone(), s.is_stored(), s.name.clone())) else {
         return app.state.toast(Tone::Warning, "Nothing to copy yet: open a scene first.");
     };
     if remote::refuses(app, "Copying the scene", "copy its folder there") {
@@ -133,10 +134,38 @@ pub(in crate::ui) fn save_copy(app: &mut App) {
         let text = "Nothing to copy yet: a scene is copied once it is trained. Export Gaussians writes a splat file.";
         return app.state.toast(Tone::Warning, text);
     }
-    app.choose(FileRequest::new_folder(FileKind::Scenes, "Empty folder for the copy"), move |app, to| {
+    // The program's own folder is out of sight: copies of its scenes go to where files were chosen last.
+    let is_own = from.starts_with(&app.workspace.folders().data);
+    let beside = from.parent().filter(|_| !is_own).map(Path::to_path_buf);
+    let last = || app.layout.folder_of(FileKind::Scenes).map(Path::to_path_buf);
+    let within = beside.clone().or_else(last).or_else(std::env::home_dir).unwrap_or_default();
+    let request = FileRequest::made_folder(FileKind::Scenes, "Save a copy of the scene", &free_copy(&name, &within));
+    app.choose(request.within(beside), move |app, to| {
         let info = JobInfo::long(format!("Copying the scene to {}", file_name(&to))).pausable();
         let copy =
             move |observer: &mut dyn Observer| -> Result<PathBuf, JobError> { save_copy::run(&from, &to, observer) };
         app.start(info, copy, is_saved);
     });
+}
+
+/// A name for a copy that nothing in the folder has: "fox-copy".
+fn free_copy(name: &str, within: &Path) -> String {
+    let name = format!("{}-copy", name.trim().replace(std::path::is_separator, "-"));
+    let numbered = (2..).map(|n: u32| format!("{name}-{n}"));
+    let free = |name: &String| within.join(name).symlink_metadata().is_err();
+    std::iter::once(name.clone()).chain(numbered).find(free).unwrap_or_default()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn copies_have_names_that_are_free() {
+        let folder = tempfile::tempdir().expect("folder");
+        assert_eq!(free_copy("my fox", folder.path()), "my fox-copy");
+        assert_eq!(free_copy("a/b", folder.path()), "a-b-copy");
+        std::fs::create_dir(folder.path().join("my fox-copy")).expect("made");
+        assert_eq!(free_copy("my fox", folder.path()), "my fox-copy-2");
+    }
 }

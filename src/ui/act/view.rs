@@ -163,7 +163,7 @@ pub(super) fn is_empty(app: &mut App, id: IdentityId) -> bool {
 }
 
 /// Selected identity, or else the first answer to the query.
-pub(super) fn chosen_identity(app: &App) -> Option<IdentityId> {
+pub(in crate::ui) fn chosen_identity(app: &App) -> Option<IdentityId> {
     app.viewport.picking.selected().or_else(|| app.viewport.queries.found().first().copied())
 }
 

@@ -76,7 +76,7 @@ impl<A> FileDialogs<A> {
         if self.asked.is_some() || self.own.is_some() {
             return Ok(());
         }
-        let folder = folder.filter(|f| f.is_dir()).map(Path::to_path_buf);
+        let folder = request.start.as_deref().or(folder).filter(|f| f.is_dir()).map(Path::to_path_buf);
         let folder = folder.or_else(std::env::home_dir).unwrap_or_else(|| "/".into());
         let open = Open { request, then, folder };
         self.repaint = Some(repaint.clone());

@@ -1,6 +1,6 @@
 //! Requests for paths: what is chosen, the formats that it may have, and the names that go with them.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use crate::ui::file_kind::FileKind;
 
@@ -72,13 +72,17 @@ pub(in crate::ui) struct FileRequest {
     pub(super) formats: Vec<FileFormat>,
     /// Format that is proposed.
     pub(super) format: usize,
+    /// True if nothing may be there yet, except for an empty folder.
+    pub(super) is_new: bool,
+    /// Folder in which the dialog opens, if not that of the last choice.
+    pub(super) start: Option<PathBuf>,
 }
 
 impl FileRequest {
     /// A folder that exists.
     pub(in crate::ui) fn folder(kind: FileKind, title: &str) -> Self {
         let purpose = PathPurpose::Folder { creates: false };
-        Self { title: title.to_owned(), kind, purpose, formats: Vec::new(), format: 0 }
+        Self { title: title.to_owned(), kind, purpose, formats: Vec::new(), format: 0, is_new: false, start: None }
     }
 
     /// A folder to write into.
@@ -94,6 +98,16 @@ impl FileRequest {
     /// A file to write. The proposed name is `stem` with the ending of the first format.
     pub(in crate::ui) fn save(kind: FileKind, title: &str, stem: &str, formats: Vec<FileFormat>) -> Self {
         Self { purpose: PathPurpose::Save(stem.to_owned()), formats, ..Self::folder(kind, title) }
+    }
+
+    /// A folder that is to be made. The proposed name is `name`.
+    pub(in crate::ui) fn made_folder(kind: FileKind, title: &str, name: &str) -> Self {
+        Self { is_new: true, ..Self::save(kind, title, name, vec![FileFormat::new("Folder", &[""])]) }
+    }
+
+    /// The same, in a dialog that opens in this folder.
+    pub(in crate::ui) fn within(self, folder: Option<PathBuf>) -> Self {
+        Self { start: folder, ..self }
     }
 
     /// The same with another proposed format.

@@ -48,6 +48,10 @@ fn judge_new(request: &FileRequest, typed: PathBuf, is_folder: bool, format: usi
     let Some(name) = typed.file_name().map(|n| n.to_string_lossy().into_owned()) else {
         return NameVerdict::Enter(typed);
     };
+    if request.is_new && typed.is_dir() {
+        let is_empty = std::fs::read_dir(&typed).is_ok_and(|mut all| all.next().is_none());
+        return if is_empty { NameVerdict::Chosen(typed) } else { NameVerdict::Enter(typed) };
+    }
     if typed.is_dir() && (is_folder || !makes_folder) {
         return NameVerdict::Enter(typed);
     }
@@ -66,6 +70,9 @@ fn judge_new(request: &FileRequest, typed: PathBuf, is_folder: bool, format: usi
         return NameVerdict::Refused(format!("{} is a folder. Choose another name.", text::path(&path)));
     }
     match path.symlink_metadata() {
+        Ok(_) if request.is_new => {
+            NameVerdict::Refused(format!("{} is there already. Choose another name.", text::path(&path)))
+        }
         Ok(_) => NameVerdict::Replaces(path),
         Err(_) => NameVerdict::Chosen(path),
     }
@@ -104,6 +111,12 @@ mod tests {
         assert_eq!(of(&old, "", 0), NameVerdict::Chosen(folder.path().into()));
         assert_eq!(of(&old, "sub", 0), NameVerdict::Enter(at("sub")));
         assert_eq!(of(&new, "b", 0), NameVerdict::Missing(at("b")));
+        let copy = FileRequest::made_folder(FileKind::Scenes, "Copy", "fox-copy");
+        assert_eq!(of(&copy, &copy.proposed(), 0), NameVerdict::Chosen(at("fox-copy")), "it need not be there");
+        assert_eq!(of(&copy, "sub", 0), NameVerdict::Chosen(at("sub")), "an empty one");
+        std::fs::write(at("sub/b.ply"), "").expect("written");
+        assert_eq!(of(&copy, "sub", 0), NameVerdict::Enter(at("sub")), "what is in it stays");
+        assert!(matches!(of(&copy, "a.ply", 0), NameVerdict::Refused(_)), "nothing is replaced");
         for (request, name) in [(&old, "b"), (&old, "a.ply"), (&new, "a.ply")] {
             assert!(matches!(of(request, name, 0), NameVerdict::Refused(_)), "{name}");
         }

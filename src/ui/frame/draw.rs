@@ -2,7 +2,7 @@
 
 use egui::{CentralPanel, Frame, Margin, Panel, ScrollArea, Ui};
 
-use crate::ui::act::{export, gaussians, objects};
+use crate::ui::act::{export, gaussians, objects, view};
 use crate::ui::actions::{Action, Pane};
 use crate::ui::app::App;
 use crate::ui::ctx::Ctx;
@@ -46,7 +46,7 @@ pub(super) fn over_everything(app: &mut App, ctx: &egui::Context) {
     if ctx.input(|i| !i.raw.hovered_files.is_empty()) {
         dialogs::drop_hint(ctx);
     }
-    let selection = app.state.semantics.as_ref().zip(app.viewport.picking.selected());
+    let selection = app.state.semantics.as_ref().zip(view::chosen_identity(app));
     let selection = selection.map(|(map, id)| {
         let is_hidden = app.viewport.visibility.draws(&map.identities, id) == Some(false);
         MenuThing { all: &map.identities, id, is_hidden }

@@ -76,6 +76,7 @@ fn take_news(app: &mut App, ctx: &egui::Context) {
     for effect in app.chat.news() {
         edits::settle(app, false);
         query::effect(app, effect);
+        edits::settle_as(app, false, Some(app.chat.sent));
     }
     edits::next(app);
     query::send_chat(app);

@@ -189,11 +189,20 @@ impl AppState {
         }
     }
 
-    /// Puts a path on top of the recent list.
+    /// Puts a path on top of the recent list, in place of any other path to the same place.
     pub(crate) fn remember(&mut self, path: PathBuf) {
-        self.recent.retain(|p| *p != path);
+        let real = |path: &PathBuf| std::fs::canonicalize(path).ok();
+        let place = real(&path);
+        self.recent.retain(|p| *p != path && (place.is_none() || real(p) != place));
         self.recent.insert(0, path);
         self.recent.truncate(MAX_RECENT);
+    }
+
+    /// Puts a scene that was made of the open one below it in the recent list, where it is found again.
+    pub(crate) fn remember_made(&mut self, path: PathBuf) {
+        let open = self.scene.as_ref().map(|scene| scene.path.clone()).filter(|open| self.recent.contains(open));
+        self.remember(path);
+        open.into_iter().for_each(|open| self.remember(open));
     }
 
     /// True if the Gaussians on screen are a result.

@@ -181,6 +181,16 @@ fn the_recent_list_is_short_and_has_no_doubles() {
     }
     assert_eq!(s.recent.len(), MAX_RECENT);
     assert_eq!(s.recent[..2], [PathBuf::from("15"), PathBuf::from("19")]);
+    let folder = tempfile::tempdir().expect("folder");
+    let [own, other] = ["fox", "other"].map(|name| folder.path().join(name));
+    for path in [&own, &other] {
+        std::fs::create_dir(path).expect("created");
+    }
+    s.recent.clear();
+    for path in [other.join("../fox"), other.clone(), own.clone()] {
+        s.remember(path);
+    }
+    assert_eq!(s.recent, [own, other], "one place, by its last path");
 }
 
 #[test]

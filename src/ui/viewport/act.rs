@@ -186,6 +186,21 @@ impl Viewport {
         self.tool.is_some()
     }
 
+    /// Names the unfinished work that another tool would drop, if there is any.
+    pub(crate) fn unfinished(&self) -> Option<&'static str> {
+        match &self.tool {
+            Some(Tool::Select(tool)) if tool.has_steps() => Some("selection"),
+            Some(Tool::Transform(tool)) if tool.is_something() => Some("change"),
+            // Measurements and crop boxes are made anew at once, and a painted mask stays with its view.
+            _ => None,
+        }
+    }
+
+    /// True if the unfinished work can be kept as it is.
+    pub(crate) fn can_keep(&self) -> bool {
+        self.select_tool().is_none_or(|tool| tool.gaussians().is_some())
+    }
+
     /// Ends the tool in use. A crop box stays.
     pub(crate) fn end_tool(&mut self) {
         self.tool = None;

@@ -173,3 +173,28 @@ fn one_more_photo_is_segmented_and_that_is_taken_back() {
     w.ask(Action::Undo);
     w.until("the old name", |a| name(a, 1) != "crate");
 }
+
+#[test]
+fn photos_without_labels_offer_masks_from_files_beside_networks() {
+    let folder = tempfile::tempdir().expect("folder");
+    boxes(folder.path());
+    for labels in ["object_ids", "part_ids"] {
+        std::fs::remove_dir_all(folder.path().join("photos").join(labels)).expect("removed");
+    }
+    std::fs::remove_file(folder.path().join("photos/identities.json")).expect("removed");
+    let mut w = Window::new(Some(Action::Open(folder.path().join("scene"))));
+    w.until("a picture at rest", |a| a.viewport.picture().is_some_and(|p| p.full));
+    w.ask(Action::FindObjects);
+    w.harness.run_steps(3);
+    assert!(w.shows("Find objects and parts"));
+    let start = std::time::Instant::now();
+    while !w.shows("Masks from files") {
+        assert!(start.elapsed() < std::time::Duration::from_secs(60), "the models are listed");
+        w.harness.step();
+        std::thread::sleep(std::time::Duration::from_millis(10));
+    }
+    w.click("Masks from files\u{2026}");
+    w.until("a choice of a folder", |a| a.chooses_file());
+    w.harness.run_steps(3);
+    assert!(w.shows("Folder with masks") && !w.shows("Masks from files"), "in place of the dialog");
+}

@@ -249,3 +249,33 @@ fn tab_completes_a_begun_name_and_then_leaves_the_field() {
     w.press(Key::Escape);
     assert!(!w.app().chooses_file());
 }
+
+#[test]
+fn a_copy_of_a_scene_has_a_name_beside_it_and_makes_its_folder() {
+    let folder = tempfile::tempdir().expect("folder");
+    let mut w = super::edits::window(folder.path());
+    let scene = folder.path().join("scene");
+    let copies = || {
+        let all = std::fs::read_dir(folder.path()).expect("there").flatten().map(|entry| entry.path());
+        let is_copy = |path: &PathBuf| path.file_name().is_some_and(|name| name.to_string_lossy().contains("-copy"));
+        let mut copies: Vec<PathBuf> = all.filter(is_copy).collect();
+        copies.sort();
+        copies
+    };
+    for n in 1..=2 {
+        w.ask(Action::SaveCopy);
+        w.until("a dialog", |a| a.chooses_file());
+        assert_eq!(copies().len(), n - 1, "nothing is made before the choice");
+        w.press(Key::Enter);
+        w.until("it is copied", |_| copies().len() == n);
+        w.until("its end", |a| a.state.job.is_none());
+        w.harness.run_steps(2);
+    }
+    assert!(w.app().state.error.is_none());
+    let copies = copies();
+    assert!(copies[1].to_string_lossy().ends_with("-copy-2"), "a name that is free: {copies:?}");
+    for copy in copies {
+        let [own, copied] = [&scene, &copy].map(|path| std::fs::read(path.join("point_cloud.ply")).expect("Gaussians"));
+        assert_eq!(own, copied);
+    }
+}

@@ -1,6 +1,6 @@
 //! Keyboard, mouse and files: what has the keyboard keeps it, what is drawn is in the window.
 
-use egui::accesskit::Role;
+use egui::accesskit::{Role, Toggled};
 use egui::{Key, Rect};
 use egui_kittest::kittest::{NodeT, Queryable};
 use glam::DVec3;
@@ -303,4 +303,64 @@ fn the_chat_asks_by_buttons_and_says_where_another_scene_begins() {
     w.until("another scene", |a| a.state.scene.as_ref().is_some_and(|s| s.name == "dots"));
     w.harness.run_steps(2);
     assert!(w.shows("dots opened"));
+}
+
+#[test]
+fn the_palette_says_that_an_object_is_to_be_selected_first() {
+    let folder = tempfile::tempdir().expect("folder");
+    let mut w = window(folder.path());
+    for selected in [false, true] {
+        if selected {
+            w.ask(Action::Select(Some(1)));
+        }
+        w.ask(Action::Palette);
+        w.types("recolor");
+        w.harness.run_steps(2);
+        assert_eq!(w.shows("select an object first"), !selected);
+        w.press(Key::Enter);
+        w.harness.run_steps(3);
+        assert_eq!(w.shows("Select an object first: click it"), !selected, "it says so");
+        assert_eq!(w.shows("Apply to a copy"), selected, "the tool");
+        if !selected {
+            w.press(Key::Escape);
+            w.harness.run_steps(3);
+        }
+    }
+}
+
+#[test]
+fn one_sentence_of_the_chat_is_one_step_of_undo() {
+    let folder = tempfile::tempdir().expect("folder");
+    let mut w = window(folder.path());
+    let say = |w: &mut Window, text: &str, answer: &'static str| {
+        w.press(Key::Enter);
+        w.types(text);
+        w.press(Key::Enter);
+        w.until(answer, |a| a.conversation().is_some_and(|talk| talk.contains(answer)));
+        w.harness.run_steps(3);
+    };
+    let shown = |w: &Window| {
+        ["box 0", "box 1", "box 2"].map(|name| {
+            let label = format!("{name} is visible");
+            let row = w.harness.get_by_role_and_label(Role::CheckBox, &label);
+            row.accesskit_node().toggled() == Some(Toggled::True)
+        })
+    };
+    say(&mut w, "hide box 0", "hide box 0");
+    assert_eq!(shown(&w), [false, true, true]);
+    say(&mut w, "show only box 1 and box 2", "box 2 are drawn now");
+    assert_eq!(shown(&w), [false, true, true]);
+    w.ask(Action::Undo);
+    assert_eq!(shown(&w), [false, true, true], "what is around the boxes alone");
+    say(&mut w, "show only box 0 and box 2", "box 0 and the box 2 are drawn now");
+    assert_eq!(shown(&w), [true, false, true]);
+    say(&mut w, "undo", "showing only box 0 and box 2");
+    assert_eq!(shown(&w), [false, true, true], "by the chat");
+    w.ask(Action::Redo);
+    assert_eq!(shown(&w), [true, false, true]);
+    w.ask(Action::Undo);
+    assert_eq!(shown(&w), [false, true, true], "by the key");
+    // The control: the sentence before is a step of its own.
+    w.ask(Action::Undo);
+    assert_eq!(shown(&w), [true; 3]);
 }

@@ -94,6 +94,7 @@ fn a_box_is_recolored_and_doubled_and_a_hundred_steps_back_and_forth_lose_nothin
     for (id, doubled) in [(1, false), (2, true), (3, false), (1, true)] {
         w.ask(Action::Transform(id));
         assert!(w.shows("Apply"));
+        assert_eq!(w.app().viewport.picking.selected(), Some(id), "what is moved is outlined");
         tick(&mut w, "Color");
         if doubled {
             tick(&mut w, "Apply to a copy");
@@ -181,4 +182,24 @@ fn undo_beyond_the_first_copy_reaches_the_scene_that_it_was_made_of() {
     w.ask(Action::Redo);
     w.until("the new name", |a| name(a) == "crate");
     assert_eq!(stored_name(), "crate");
+}
+
+#[test]
+fn all_of_it_moves_the_whole_and_selects_it() {
+    let folder = tempfile::tempdir().expect("folder");
+    let mut w = window(folder.path());
+    let count = |a: &App| a.state.semantics.as_ref().map_or(0, |m| m.identities.len());
+    let gaussians = {
+        let map = w.app().state.semantics.clone().expect("objects");
+        (0..map.identity_of.len() as u32).filter(|i| map.identity_of[*i as usize] == 1).step_by(2).collect()
+    };
+    w.ask(Action::Change(Edit::AddPiece { of: 1, name: "lid".into(), gaussians }));
+    w.until("a part", |a| count(a) == 4 && a.viewport.picking.selected() == Some(4));
+    w.ask(Action::Transform(4));
+    w.harness.run_steps(4);
+    assert!(w.shows("Move \u{201c}lid"));
+    w.click("All of it");
+    w.harness.run_steps(4);
+    assert!(w.shows("Move \u{201c}box 0") && !w.shows("Move \u{201c}lid"));
+    assert_eq!(w.app().viewport.picking.selected(), Some(1), "outline and list follow");
 }

@@ -30,6 +30,9 @@ fn a_scene_without_a_box_is_seen_beside_and_opened() {
     w.until("another one", |_| again.join("scene.json").is_file());
     w.until("it is shown", |a| a.state.beside.first().is_some_and(|b| b.path == again));
     w.harness.run_steps(2);
+    // Both are found again, below the scene that is open.
+    let scene = folder.path().join("scene");
+    assert_eq!(w.app().state.recent, [scene.clone(), again.clone(), made.clone()]);
 
     // One that is not wanted is deleted, once that is said twice, but not with what others put there.
     let other = again.join("notes.txt");
@@ -50,6 +53,7 @@ fn a_scene_without_a_box_is_seen_beside_and_opened() {
     assert!(again.join("scene.json").is_file() && !w.app().state.beside.is_empty());
     answer(&mut w, "Delete");
     assert!(!again.exists() && made.join("scene.json").is_file() && w.app().state.beside.is_empty());
+    assert_eq!(w.app().state.recent, [scene, made.clone()], "what is gone is not offered");
     w.ask(Action::Remove(2));
     w.until("it is made once more", |a| a.state.beside.first().is_some_and(|b| b.path == again));
     w.harness.run_steps(2);
@@ -72,6 +76,7 @@ fn a_scene_without_a_box_is_seen_beside_and_opened() {
     }
     let first = folder.path().join("scene");
     w.until("the first one", |a| a.state.scene.as_ref().is_some_and(|s| s.out == first) && a.state.job.is_none());
+    assert!(!w.app().state.recent.contains(&third) && w.app().state.recent.contains(&made));
     assert!(made.join("scene.json").is_file(), "the others stay");
 }
 

@@ -107,6 +107,41 @@ fn trainings_of_a_data_set_are_listed_opened_renamed_and_deleted() {
 }
 
 #[test]
+fn a_training_near_its_photos_stays_in_their_list_with_view_and_query() {
+    // Scenes refer to photos in the same part of the disk by a path from their own folder.
+    let folder = tempfile::tempdir_in(env!("CARGO_TARGET_TMPDIR")).expect("folder");
+    let mut w = trained_twice(folder.path().join("data"));
+    let center = |a: &App| a.viewport.pose().center;
+    let asked = |a: &App| a.viewport.queries.all().count();
+    w.until("a picture", |a| a.viewport.picture().is_some());
+    let home = center(w.app());
+    w.harness.key_down(Key::W);
+    w.until("a nearer view", |a| center(a).distance(home) > 1e-3);
+    w.harness.key_up(Key::W);
+    w.harness.run_steps(20);
+    w.ask(Action::Ask("table".into()));
+    w.harness.run_steps(2);
+    assert_eq!(asked(w.app()), 1);
+    let place = center(w.app());
+    for name in ["run-1", "run-2"] {
+        let run = out(w.app()).with_file_name(name);
+        w.ask(Action::Open(run.clone()));
+        w.until("it is open", |a| out(a) == run && a.state.job.is_none());
+        w.until("its picture", |a| a.viewport.picture().is_some());
+        assert_eq!(runs(w.app()), ["run-1", "run-2"]);
+        assert!(center(w.app()).distance(place) < 1e-6, "the same view");
+        assert_eq!(asked(w.app()), 1, "the same query");
+        assert_eq!(w.app().state.recent.len(), 1, "the same photos: {:?}", w.app().state.recent);
+    }
+    // The control: another scene has its own view, and no trainings.
+    w.ask(Action::Open(write_splat(folder.path())));
+    w.until("the splat", |a| a.state.scene.as_ref().is_some_and(|s| s.name == "dots"));
+    w.harness.run_steps(2);
+    assert!(runs(w.app()).is_empty() && asked(w.app()) == 0 && w.app().state.recent.len() == 2);
+    assert!(center(w.app()).distance(place) > 1e-6);
+}
+
+#[test]
 fn enter_on_the_first_page_opens_what_was_open_last() {
     let folder = tempfile::tempdir().expect("folder");
     let mut w = Window::keeping(folder.path().join("data"), None);

@@ -271,3 +271,51 @@ fn the_result_of_a_canceled_selection_is_not_that_of_the_next() {
     let left = |id: u32| map.identity_of.iter().filter(|of| **of == id).count();
     assert!(left(3) < left(2), "what was clicked on is taken from box 2, nothing from box 1");
 }
+
+#[test]
+fn another_tool_does_not_drop_a_selection_or_a_change_unasked() {
+    let folder = tempfile::tempdir().expect("folder");
+    let mut w = asked(folder.path());
+    let box_1 = middle_of(&w, 2);
+    // The control: a selection without a click is nothing to lose.
+    w.ask(Action::SegmentNew(Some(0)));
+    w.ask(Action::Measure);
+    assert!(!w.shows("not kept yet") && w.app().viewport.selection().is_none());
+    w.ask(Action::Measure);
+    w.ask(Action::SegmentNew(Some(0)));
+    w.until("a picture for it", |a| a.viewport.picture().is_some_and(|p| p.full));
+    click(&mut w, box_1, Modifiers::NONE);
+    w.until("an answer", |a| a.viewport.selection().is_some_and(|n| n > 0));
+    let selected = w.app().viewport.selection();
+    for key in [Key::M, Key::X, Key::B] {
+        w.press(key);
+        w.harness.run_steps(3);
+        assert!(w.shows("The selection is not kept yet"), "{key:?}");
+        // The safe answer has the keyboard.
+        w.press(Key::Enter);
+        w.harness.run_steps(3);
+        assert!(!w.shows("not kept yet") && w.app().viewport.selection() == selected, "{key:?}");
+    }
+    // Another shape goes on with the same selection.
+    w.ask(Action::SelectBy(fmlgs::ui::select_shape::SelectShape::Brush));
+    assert!(!w.shows("not kept yet") && w.app().viewport.selection() == selected);
+    w.press(Key::M);
+    w.harness.run_steps(3);
+    w.click("Keep it");
+    w.until("it is an object", |a| a.state.semantics.as_ref().is_some_and(|m| m.identities.len() == 4));
+    w.harness.run_steps(5);
+    assert!(w.app().viewport.selection().is_none() && !w.shows("Keep as"), "the other tool is in use");
+    w.ask(Action::Measure);
+    w.ask(Action::Transform(1));
+    w.harness.run_steps(3);
+    w.harness.get_by_role_and_label(egui::accesskit::Role::CheckBox, "Apply to a copy").click();
+    w.harness.run_steps(3);
+    w.press(Key::X);
+    w.harness.run_steps(3);
+    assert!(w.shows("The change is not kept yet"));
+    w.click("Discard it");
+    w.harness.run_steps(3);
+    assert!(!w.shows("Apply to a copy"), "the other tool is in use");
+    let objects = w.app().state.semantics.as_ref().map(|m| m.identities.len());
+    assert_eq!(objects, Some(4), "nothing was copied");
+}

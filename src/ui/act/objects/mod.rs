@@ -266,6 +266,8 @@ pub(in crate::ui) fn submit_removal(app: &mut App, request: RemoveRequest) {
         let Some(removed) = removed else { return };
         app.state.result(removal::summary(&removed.name, &removed.report));
         app.state.say(Tone::Info, format!("Saved to {}", removed.folder.display()));
+        // Another fill takes its place beside the scene, but stays on disk.
+        app.state.remember_made(removed.folder.clone());
         super::comparing::open(app, removed.folder.clone());
         // Both views show the place of what was removed.
         let all = removed.request.options.ids.iter().filter_map(|id| app.viewport.bounds_of(*id, &app.state));
@@ -296,6 +298,7 @@ fn delete_removed(app: &mut App) {
     match removed.delete() {
         Ok(()) => {
             app.state.beside.retain(|other| other.path != removed.folder);
+            app.state.recent.retain(|path| *path != removed.folder);
             app.state.toast(Tone::Good, format!("Deleted {}", removed.folder.display()));
         }
         Err(e) => {

@@ -188,7 +188,7 @@ impl SelectTool {
     }
 
     /// True if there is a step to undo.
-    fn has_steps(&self) -> bool {
+    pub(crate) fn has_steps(&self) -> bool {
         !self.drawn_lines.is_empty() || self.selected.as_ref().is_some_and(|s| s.steps() > 0)
     }
 

@@ -4,18 +4,20 @@
 //! No code reports a change. The window's state is compared with the last snapshot whenever it is at rest, so a drag or
 //! a name that is typed is one change.
 
+pub(super) mod texts;
+
 use std::collections::BTreeSet;
 use std::path::PathBuf;
 use std::sync::Arc;
 
+use self::texts::described;
+use crate::agent::scene::UndoneRequest;
 use crate::jobs::edit::EditRequest;
-use crate::jobs::rearrange::{Placement, SplatEdit};
-use crate::math::format::{count, things};
-use crate::pipeline::semantics::lifting::edit::Edit;
+use crate::jobs::rearrange::SplatEdit;
 use crate::pipeline::semantics::query::recipe::QueryConfig;
-use crate::scene::measurement::{Measurement, change_text};
+use crate::scene::measurement::Measurement;
 use crate::scene::undo::UndoHistory;
-use crate::scene::{CameraPath, CropBox, GaussianCloud, Identities, IdentityId, NO_IDENTITY, SemanticMap};
+use crate::scene::{CameraPath, CropBox, GaussianCloud, IdentityId, SemanticMap};
 use crate::worker::ViewMode;
 
 /// Largest memory for Gaussians of earlier states, bytes.
@@ -57,6 +59,8 @@ pub(crate) struct EditSnapshot {
 struct Change {
     what: String,
     other: EditSnapshot,
+    /// Number of the sentence of the chat that made it, if one did: all that it makes is one change.
+    sentence: Option<u64>,
 }
 
 /// The changes so far, and the current state.
@@ -93,6 +97,16 @@ impl ChangeHistory {
     /// Records the current state. `edit` describes a change of objects, parts and Gaussians; if they changed without
     /// it, the history is cleared. Returns the description of the change.
     pub(crate) fn settle(&mut self, now: &EditSnapshot, edit: Option<&str>) -> Option<String> {
+        self.settle_as(now, edit, None)
+    }
+
+    /// Records the current state, which the chat's `sentence` of this number led to: one sentence is one change.
+    pub(crate) fn settle_as(
+        &mut self,
+        now: &EditSnapshot,
+        edit: Option<&str>,
+        sentence: Option<u64>,
+    ) -> Option<String> {
         let before = self.now.as_ref().filter(|before| before.scene == now.scene);
         let is_edited = before.is_some_and(|before| before.is_edited(now));
         let Some(before) = before.filter(|_| !is_edited || edit.is_some()) else {
@@ -106,8 +120,22 @@ impl ChangeHistory {
             Some(edit) => edit.to_owned(),
             None => described(&before.view, &now.view, now.map.as_ref().map(|map| &map.identities)),
         };
-        if let Some(other) = self.now.replace(now.clone()) {
-            self.changes.record(Change { what: what.clone(), other });
+        let goes_on = sentence.is_some() && self.changes.last().is_some_and(|last| last.sentence == sentence);
+        let begun = if goes_on { self.changes.take() } else { None };
+        let other = self.now.replace(now.clone());
+        let (what, other) = match begun {
+            Some(begun) if !begun.other.is_edited(now) => {
+                if begun.other.view == now.view {
+                    return None;
+                }
+                let identities = now.map.as_ref().map(|map| &map.identities);
+                (described(&begun.other.view, &now.view, identities), Some(begun.other))
+            }
+            Some(begun) => (format!("{}, {what}", begun.what), Some(begun.other)),
+            None => (what, other),
+        };
+        if let Some(other) = other {
+            self.changes.record(Change { what: what.clone(), other, sentence });
             self.forget_the_farthest();
         }
         Some(what)
@@ -143,7 +171,8 @@ impl ChangeHistory {
     /// Goes back or forth by one change; returns its description and the state to restore.
     pub(crate) fn go(&mut self, redo: bool) -> Option<(String, EditSnapshot)> {
         let what = if redo { self.next() } else { self.last() }?.to_owned();
-        let mut change = Change { what: what.clone(), other: self.now.clone()? };
+        // What was undone and redone is complete: nothing is added to it.
+        let mut change = Change { what: what.clone(), other: self.now.clone()?, sentence: None };
         if redo {
             self.changes.redo(&mut change)
         } else {
@@ -161,124 +190,16 @@ fn is_same<T>(a: &Option<Arc<T>>, b: &Option<Arc<T>>) -> bool {
     }
 }
 
-/// Description of an edit.
-pub(crate) fn edit_text(request: &EditRequest, all: &Identities) -> String {
-    let added = |of: IdentityId, name: &str| match (name.trim(), of) {
-        ("", NO_IDENTITY) => "added an object".to_owned(),
-        ("", of) => format!("added a part of {}", all.label(of)),
-        (name, _) => format!("added {name}"),
-    };
-    match request {
-        EditRequest::Apply(Edit::Rename(id, name)) => format!("renamed {} to {}", all.label(*id), name.trim()),
-        EditRequest::Apply(Edit::Merge(from, into)) => format!("merged {} into {}", all.label(*from), all.label(*into)),
-        EditRequest::Apply(Edit::Dissolve(id)) => format!("dissolved {}", all.label(*id)),
-        EditRequest::Apply(Edit::Split(id)) => format!("split {}", all.label(*id)),
-        EditRequest::Apply(Edit::AddPiece { of, name, .. }) => added(*of, name),
-        EditRequest::Apply(Edit::Reshape { id, .. }) => format!("corrected {}", all.label(*id)),
-        EditRequest::Restore(_) => "restored objects and parts".to_owned(),
-    }
-}
-
-/// Description of an edit of Gaussians.
-pub(crate) fn splat_edit_text(edit: &SplatEdit, all: &Identities) -> String {
-    match edit {
-        SplatEdit::Delete(gone) => format!("deleted {}", things(gone.iter().filter(|g| **g).count(), "Gaussian")),
-        SplatEdit::Arrange(to) => {
-            let what = match to {
-                _ if to.duplicate => "duplicated",
-                _ if to.to == Placement::default() => "recolored",
-                _ if to.is_recolored() => return format!("changed {}: moved, recolored", all.label(to.id)),
-                _ => "moved",
-            };
-            format!("{what} {}", all.label(to.id))
-        }
-    }
-}
-
-/// Description of a change of the view.
-fn described(before: &ViewState, now: &ViewState, all: Option<&Identities>) -> String {
-    if before.hidden != now.hidden {
-        return all.map_or_else(String::new, |all| shown_text(&before.hidden, &now.hidden, all));
-    }
-    if before.crop != now.crop {
-        return match (before.crop, now.crop) {
-            (None, _) => "cropped the view",
-            (_, None) => "removed the crop box",
-            (Some(before), Some(now)) if before.outside != now.outside => "inverted the crop box",
-            _ => "changed the crop box",
-        }
-        .to_owned();
-    }
-    if before.path != now.path {
-        let (n, keys) = (now.path.keys.len(), before.path.keys.len());
-        let what = match n.abs_diff(keys) {
-            0 => "changed the camera path",
-            1 if n > keys => "added a keyframe",
-            1 => "deleted a keyframe",
-            _ => "replaced the camera path",
-        };
-        return what.to_owned();
-    }
-    if before.measurements != now.measurements {
-        return change_text(&before.measurements, &now.measurements);
-    }
-    if let Some((_, now)) = before.modes.iter().zip(now.modes).find(|(before, now)| *before != now) {
-        return match now {
-            ViewMode::Rgb => "showed RGB".to_owned(),
-            other => format!("showed {}", other.text().to_lowercase()),
-        };
-    }
-    if before.split != now.split {
-        return if now.split { "split the view" } else { "ended the split view" }.to_owned();
-    }
-    if before.dim != now.dim {
-        return if now.dim { "dimmed everything else" } else { "ended dimming" }.to_owned();
-    }
-    if before.cameras != now.cameras {
-        return format!("{} the cameras", if now.cameras { "showed" } else { "hid" });
-    }
-    if before.recipes != now.recipes {
-        return "changed the recipe".to_owned();
-    }
-    "changed what is pinned".to_owned()
-}
-
-fn shown_text(before: &BTreeSet<IdentityId>, now: &BTreeSet<IdentityId>, all: &Identities) -> String {
-    if now.is_empty() {
-        return "showed everything".to_owned();
-    }
-    // A whole stands for its parts.
-    let outermost = |ids: &BTreeSet<IdentityId>| -> Vec<IdentityId> {
-        let whole = |id: &IdentityId| all.get(*id).is_some_and(|i| ids.contains(&i.parent));
-        ids.iter().copied().filter(|id| all.get(*id).is_some() && !whole(id)).collect()
-    };
-    let drawn: BTreeSet<IdentityId> = all.iter().map(|(id, _)| id).filter(|id| !now.contains(id)).collect();
-    let named = |ids: BTreeSet<IdentityId>| match outermost(&ids).as_slice() {
-        [one] => all.full_name(*one),
-        [one, other] => format!("{} and {}", all.full_name(*one), all.full_name(*other)),
-        more => format!("{} objects and parts", count(more.len() as u64)),
-    };
-    if let (true, [_] | [_, _]) = (now.contains(&NO_IDENTITY), outermost(&drawn).as_slice()) {
-        return format!("showed only {}", named(drawn));
-    }
-    let (gone, back): (BTreeSet<_>, BTreeSet<_>) = (now - before, before - now);
-    match (gone.is_empty(), back.is_empty()) {
-        (false, true) => format!("hid {}", named(gone)),
-        (true, _) => format!("showed {}", named(back)),
-        _ => format!("hid {}, showed {}", named(gone), named(back)),
-    }
-}
-
 /// An edit that waits for those before it.
 pub(super) enum EditStep {
     Request(EditRequest),
+    /// An edit by the chat's sentence of this number.
+    Said(EditRequest, u64),
     Rearrange(SplatEdit),
     Undo,
     Redo,
-    /// The agent undid a rename; the identity gets this name again.
-    UndoRename(IdentityId, String),
-    /// The agent undid hiding or showing; these identities are hidden again.
-    UndoHidden(Vec<IdentityId>),
+    /// The agent undid the changes of a sentence.
+    UndoSentence(UndoneRequest),
 }
 
 /// A running change of objects and parts.
@@ -287,6 +208,8 @@ pub(super) struct Editing {
     pub(super) what: Option<String>,
     /// True if it is a redo.
     pub(super) redo: bool,
+    /// Number of the chat's sentence that asked for it.
+    pub(super) sentence: Option<u64>,
 }
 
 /// A running search of objects and parts that becomes a step of the history.
@@ -302,7 +225,7 @@ mod tests {
     use glam::{DMat3, DVec3};
 
     use super::*;
-    use crate::scene::{Level, PathKey};
+    use crate::scene::{Identities, Level, NO_IDENTITY, PathKey};
 
     fn lamp() -> Arc<SemanticMap> {
         let mut identities = Identities::default();
@@ -373,6 +296,33 @@ mod tests {
     }
 
     #[test]
+    fn all_that_one_sentence_changes_is_one_change() {
+        let (mut history, mut now) = start();
+        now.view.hidden = [1, 2].into();
+        assert_eq!(history.settle_as(&now, None, Some(1)).as_deref(), Some("hid lamp"));
+        now.view.hidden = [0, 1, 2].into();
+        assert_eq!(history.settle_as(&now, None, Some(1)).as_deref(), Some("showed only table"));
+        now.map = Some(lamp());
+        assert_eq!(
+            history.settle_as(&now, Some("renamed table to desk"), Some(1)).as_deref(),
+            Some("showed only table, renamed table to desk")
+        );
+        now.view.dim = true;
+        assert_eq!(history.settle_as(&now, None, Some(2)).as_deref(), Some("dimmed everything else"), "the control");
+        assert!(history.go(false).is_some_and(|(what, _)| what == "dimmed everything else"));
+        assert!(history.go(false).is_some_and(|(_, back)| back.view.hidden.is_empty()), "in one step");
+        assert_eq!(history.last(), None);
+        let (_, again) = history.go(true).expect("something to redo");
+        assert_eq!(again.view.hidden.len(), 3);
+        // What it takes back itself is no change.
+        let (mut history, mut now) = start();
+        now.view.dim = true;
+        assert!(history.settle_as(&now, None, Some(1)).is_some());
+        now.view.dim = false;
+        assert_eq!((history.settle_as(&now, None, Some(1)), history.last()), (None, None));
+    }
+
+    #[test]
     fn another_scene_and_objects_found_anew_have_no_past() {
         for change in [|now: &mut EditSnapshot| now.scene = 2, |now: &mut EditSnapshot| now.map = Some(lamp())] {
             let (mut history, mut now) = start();
@@ -381,20 +331,5 @@ mod tests {
             change(&mut now);
             assert_eq!((history.settle(&now, None), history.last()), (None, None));
         }
-    }
-
-    #[test]
-    fn what_is_hidden_is_named_by_its_whole() {
-        let map = lamp();
-        let text = |before: &[IdentityId], now: &[IdentityId]| {
-            let set = |ids: &[IdentityId]| ids.iter().copied().collect();
-            shown_text(&set(before), &set(now), &map.identities)
-        };
-        assert_eq!(text(&[], &[1, 2]), "hid lamp");
-        assert_eq!(text(&[], &[2]), "hid shade · lamp");
-        assert_eq!(text(&[1, 2, 3], &[3]), "showed lamp");
-        assert_eq!(text(&[], &[0, 1, 3]), "showed only shade · lamp");
-        assert_eq!(text(&[0, 1, 2], &[0]), "showed only lamp and table");
-        assert_eq!(text(&[2], &[3]), "hid table, showed shade · lamp");
     }
 }
