@@ -147,8 +147,9 @@ fn turned_signatures(photo: &GrayPlane, scale: f64) -> [ViewSignature; 4] {
 /// The pose of a photo that is like a view after so many quarter turns, at this place.
 fn pose_of(view: &Camera, lens: &Camera, turns: usize, placed: Placed) -> Camera {
     let middle = DVec2::new(f64::from(view.width_px), f64::from(view.height_px)) * 0.5;
-    let toward = view.ray(middle + DVec2::from(placed.shift_px)).normalize();
-    let swing = glam::DMat3::from_quat(DQuat::from_rotation_arc(view.ray(middle).normalize(), toward));
+    let [toward, ahead] =
+        [middle + DVec2::from(placed.shift_px), middle].map(|at| view.ray(at).normalize_or(view.forward()));
+    let swing = glam::DMat3::from_quat(DQuat::from_rotation_arc(ahead, toward));
     let mut axes = swing * view.world_from_camera;
     for _ in 0..turns {
         axes = glam::DMat3::from_cols(axes.y_axis, -axes.x_axis, axes.z_axis);

@@ -22,7 +22,6 @@ const OF_MAD: f32 = 1.4826;
 #[derive(Clone, Debug)]
 pub(super) struct PhotoLevel {
     pub(super) width: usize,
-    pub(super) height: usize,
     pub(super) planes: [Vec<f32>; 3],
     /// Share of each pixel that the photo covers.
     pub(super) coverage: Vec<f32>,
@@ -42,7 +41,7 @@ impl PhotoLevel {
             plane.iter_mut().zip(&coverage).filter(|(_, c)| **c > 0.0).for_each(|(v, c)| *v /= *c);
         }
         let coverage = coverage.into_iter().map(|c| if c > 0.5 { c } else { 0.0 }).collect();
-        Self { width, height, planes, coverage }
+        Self { width, planes, coverage }
     }
 }
 
@@ -149,7 +148,7 @@ mod tests {
 
     fn level(of: impl Fn(usize) -> f32) -> PhotoLevel {
         let plane: Vec<f32> = (0..400).map(of).collect();
-        PhotoLevel { width: 20, height: 20, planes: [plane.clone(), plane.clone(), plane], coverage: vec![1.0; 400] }
+        PhotoLevel { width: 20, planes: [plane.clone(), plane.clone(), plane], coverage: vec![1.0; 400] }
     }
 
     fn scene(i: usize) -> f32 {
