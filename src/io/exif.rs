@@ -20,7 +20,7 @@ const SENSOR_RESOLUTION: u16 = 0xA20E;
 const SENSOR_UNIT: u16 = 0xA210;
 const SENSOR_WIDTH_PX: u16 = 0xA002;
 
-/// What EXIF says of a focal length.
+/// Statement of EXIF about a focal length.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum ExifFocal {
     /// Nothing.

@@ -20,7 +20,7 @@ const SMALL_PX: u32 = 96;
 /// Longer side of pictures whose features are compared, px.
 pub(super) const FEATURES_PX: u32 = 640;
 /// Features of a picture at its finest level.
-pub(super) const MOST_FEATURES: usize = 700;
+pub(super) const MOST_FEATURES: usize = 500;
 /// Views at most; of more cameras, some evenly spaced.
 const MOST_VIEWS: usize = 256;
 

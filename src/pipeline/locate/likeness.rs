@@ -1,4 +1,4 @@
-//! Whether a photo shows the scene: correlation by block between photo and rendering, which no exposure changes and no
+//! Agreement of a photo with the scene: correlation by block between photo and rendering, which no exposure changes and no
 //! other picture reaches.
 
 use super::gray::GrayPlane;
