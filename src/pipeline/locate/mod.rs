@@ -46,6 +46,8 @@ pub(crate) const PHOTO_PX: u32 = FEATURES_PX;
 const LEAST_PX: u32 = 32;
 /// Longer side of the pictures whose colors are aligned, from coarse to fine; the last is the caller's.
 const LEVELS_PX: [u32; 2] = [96, 192];
+/// Steps at the finest pictures at most: each takes as long as all of the coarse ones, and little is left to do.
+const FINEST_STEPS: usize = 6;
 /// Usual longer side of the finest pictures, px.
 pub(crate) const USUAL_PX: u32 = 400;
 /// Views whose features are matched at once, and such groups at most.
@@ -265,7 +267,8 @@ impl Locator {
                 let start = start.resized(size.width_px, size.height_px);
                 let changed = (start.focal_px.x / size.focal_px.x).ln();
                 let bounds: FocalBounds = most.map(|most| [-most - changed, most - changed]);
-                let aligned = align(&mut self.gallery, &level, &start, bounds, STEPS)?;
+                let steps = if px == self.finest_px { FINEST_STEPS } else { STEPS };
+                let aligned = align(&mut self.gallery, &level, &start, bounds, steps)?;
                 let Likeness { explained, correlation } = compare(&aligned, &level);
                 if best.as_ref().is_none_or(|(most, _)| explained + correlation > *most) {
                     best = Some((explained + correlation, aligned));
