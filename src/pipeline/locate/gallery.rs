@@ -21,6 +21,9 @@ const SMALL_PX: u32 = 96;
 pub(super) const FEATURES_PX: u32 = 640;
 /// Features of a picture at its finest level.
 pub(super) const MOST_FEATURES: usize = 500;
+/// Shares of the distance from a view to the scene at which a photo may have been taken, and weights of the likeness:
+/// the smaller a photo is made, the more places it is like by chance.
+const DISTANCES: [(f64, f32); 2] = [(1.0, 1.0), (0.5, 0.85)];
 /// Views at most; of more cameras, some evenly spaced.
 const MOST_VIEWS: usize = 256;
 
@@ -36,6 +39,8 @@ pub(super) struct Gallery {
 struct GalleryView {
     camera: Camera,
     signature: ViewSignature,
+    /// Usual depth of what it sees, scene units.
+    depth: f64,
     /// Features with places in the world; made when they are first needed.
     features: Option<Arc<Vec<WorldFeature>>>,
 }
@@ -45,7 +50,8 @@ struct GalleryView {
 pub(super) struct AlikeView {
     pub(super) view: usize,
     pub(super) likeness: f32,
-    /// Pose of the photo if it were taken from the view's place: turned toward the shift, and by quarters.
+    /// Pose of the photo if it were taken from the view's place or on the way to the scene: turned toward the shift, and
+    /// by quarters.
     pub(super) pose: Camera,
 }
 
@@ -67,7 +73,9 @@ impl Gallery {
             let small = camera.limited_to(SMALL_PX);
             let frame = gallery.draw(&small)?;
             let signature = ViewSignature::of(&GrayPlane::of_planes(&frame.color, frame.width_px));
-            gallery.views.push(GalleryView { camera: camera.clone(), signature, features: None });
+            let depths: Vec<f64> = frame.median_depth.iter().filter(|d| **d > 0.0).map(|d| f64::from(*d)).collect();
+            let depth = if depths.is_empty() { 0.0 } else { median(&depths) };
+            gallery.views.push(GalleryView { camera: camera.clone(), signature, depth, features: None });
             ticker.tick(done + 1, observer)?;
         }
         Ok(gallery)
@@ -87,20 +95,27 @@ impl Gallery {
     pub(super) fn alike(&self, photo: &GrayPlane, lens: &Camera) -> Vec<AlikeView> {
         let mut shrunk: Vec<(f64, [ViewSignature; 4])> = Vec::new();
         let mut found = Vec::with_capacity(self.views.len());
-        for (view, GalleryView { camera, signature, .. }) in self.views.iter().enumerate() {
+        for (view, GalleryView { camera, signature, depth, .. }) in self.views.iter().enumerate() {
             let small = camera.limited_to(SMALL_PX);
-            // The photo at the size at which things of one distance are as large as in the view.
-            let scale = small.focal_px.y / lens.focal_px.y;
-            let known = shrunk.iter().position(|(s, _)| (s / scale - 1.0).abs() < 0.02);
-            let at = known.unwrap_or_else(|| {
-                shrunk.push((scale, turned_signatures(photo, scale)));
-                shrunk.len() - 1
-            });
-            let placed = shrunk[at].1.iter().enumerate().map(|(turns, s)| (turns, s.placed_on(signature)));
-            let best = placed.max_by(|a, b| a.1.likeness.total_cmp(&b.1.likeness));
-            if let Some((turns, placed)) = best {
-                found.push(AlikeView { view, likeness: placed.likeness, pose: pose_of(&small, lens, turns, placed) });
+            let mut best: Option<AlikeView> = None;
+            for (distance, weight) in DISTANCES {
+                // The photo at the size at which things of that distance are as large as in the view.
+                let scale = distance * small.focal_px.y / lens.focal_px.y;
+                let known = shrunk.iter().position(|(s, _)| (s / scale - 1.0).abs() < 0.02);
+                let at = known.unwrap_or_else(|| {
+                    shrunk.push((scale, turned_signatures(photo, scale)));
+                    shrunk.len() - 1
+                });
+                for (turns, turned) in shrunk[at].1.iter().enumerate() {
+                    let placed = turned.placed_on(signature);
+                    let likeness = weight * placed.likeness;
+                    if best.as_ref().is_none_or(|b| likeness > b.likeness) {
+                        let pose = pose_of(&small, lens, turns, placed, (1.0 - distance) * depth);
+                        best = Some(AlikeView { view, likeness, pose });
+                    }
+                }
             }
+            found.extend(best);
         }
         found.sort_by(|a, b| b.likeness.total_cmp(&a.likeness));
         found
@@ -144,8 +159,8 @@ fn turned_signatures(photo: &GrayPlane, scale: f64) -> [ViewSignature; 4] {
     [upright, once, twice, thrice].map(|gray| ViewSignature::of(&gray))
 }
 
-/// The pose of a photo that is like a view after so many quarter turns, at this place.
-fn pose_of(view: &Camera, lens: &Camera, turns: usize, placed: Placed) -> Camera {
+/// The pose of a photo that is like a view after so many quarter turns, at this place, and so much nearer (scene units).
+fn pose_of(view: &Camera, lens: &Camera, turns: usize, placed: Placed, nearer: f64) -> Camera {
     let middle = DVec2::new(f64::from(view.width_px), f64::from(view.height_px)) * 0.5;
     let [toward, ahead] =
         [middle + DVec2::from(placed.shift_px), middle].map(|at| view.ray(at).normalize_or(view.forward()));
@@ -154,7 +169,7 @@ fn pose_of(view: &Camera, lens: &Camera, turns: usize, placed: Placed) -> Camera
     for _ in 0..turns {
         axes = glam::DMat3::from_cols(axes.y_axis, -axes.x_axis, axes.z_axis);
     }
-    Camera { world_from_camera: axes, center: view.center, ..lens.clone() }
+    Camera { world_from_camera: axes, center: view.center + toward * nearer, ..lens.clone() }
 }
 
 #[cfg(test)]
@@ -171,7 +186,7 @@ mod tests {
         let seen = view.project(point).expect("in front");
         // The photo that, turned clockwise once, is the view: (x, y) there was (y, 72 - x) before.
         let lens = Camera { width_px: 72, height_px: 96, principal_px: DVec2::new(36.0, 48.0), ..view.clone() };
-        let photo = pose_of(&view, &lens, 1, placed).project(point).expect("in front");
+        let photo = pose_of(&view, &lens, 1, placed, 0.0).project(point).expect("in front");
         let turned = DVec2::new(96.0 - photo.y, photo.x);
         assert!(turned.distance(seen) < 1e-9, "{turned} {seen}");
     }
@@ -179,8 +194,8 @@ mod tests {
     #[test]
     fn a_shift_turns_the_camera_toward_it() {
         let view = Camera::look_at(DVec3::new(0.0, -4.0, 1.0), DVec3::ZERO, DVec3::Z, 0.8, 96, 72).expect("valid");
-        let posed = pose_of(&view, &view, 0, Placed { likeness: 1.0, shift_px: [16.0, -8.0] });
-        let there = posed.center + view.ray(DVec2::new(64.0, 28.0));
+        let posed = pose_of(&view, &view, 0, Placed { likeness: 1.0, shift_px: [16.0, -8.0] }, 0.5);
+        let there = view.center + 2.0 * view.ray(DVec2::new(64.0, 28.0));
         assert!(posed.project(there).expect("in front").distance(DVec2::new(48.0, 36.0)) < 1e-9);
     }
 }

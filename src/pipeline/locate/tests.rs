@@ -129,6 +129,15 @@ fn a_photo_taken_upright_is_located_and_so_is_its_focal_length() {
 }
 
 #[test]
+fn a_close_up_is_located() {
+    let (mut locator, cloud) = (locator(), scene(1));
+    let mut near = at(0.5, 1.2, 1.9);
+    near.world_from_camera *= DMat3::from_quat(DQuat::from_scaled_axis(DVec3::new(0.1, 0.05, 0.0)));
+    let found = locator.locate(&photo(&cloud, &near, |_, _, v| v), &lens(), FocalKnowledge::Known, &Silent);
+    assert_found(&found.expect("located"), &near);
+}
+
+#[test]
 fn noise_and_another_scene_are_refused() {
     let mut locator = locator();
     let other = photo(&scene(2), &truth(), |_, _, v| v);
