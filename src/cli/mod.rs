@@ -29,6 +29,7 @@ mod idle;
 mod import;
 mod info;
 mod interrupt;
+mod locate;
 mod mcp;
 mod models;
 mod number;
@@ -93,6 +94,7 @@ Examples:
   fmlgs query scene/ \"the lid of the kettle\" --mask lid.png
   fmlgs compare langsplat/ scene/ --phrases words.txt --views 0,12 --out side_by_side/
   fmlgs remove scene/ \"the kettle\" --out without_kettle/
+  fmlgs locate scene/ photo.jpg         where was this photo taken?
   fmlgs path scene/ --to \"the lid of the kettle\" --out path.json
   fmlgs render scene/ --path path.json --out video.mp4
   fmlgs agent scene/ \"what is on the table?\"
@@ -140,6 +142,7 @@ enum Command {
     Remove(remove::RemoveArgs),
     Clean(clean::CleanArgs),
     Edit(edit::EditArgs),
+    Locate(locate::LocateArgs),
     Path(path::PathArgs),
     Agent(agent::AgentArgs),
     Mcp(mcp::McpArgs),
@@ -230,6 +233,7 @@ fn run(cli: Cli, open_window: OpenWindow) -> Result<(), CliError> {
         Command::Remove(args) => remove::run(args, quiet),
         Command::Clean(args) => clean::run(args, quiet),
         Command::Edit(args) => edit::run(args, quiet),
+        Command::Locate(args) => locate::run(&args, quiet),
         Command::Path(args) => path::run(args),
         Command::Agent(args) => agent::run(args),
         Command::Mcp(args) => mcp::run(args, quiet),

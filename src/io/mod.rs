@@ -14,6 +14,7 @@ mod commit;
 mod compressed_ply;
 pub(crate) mod data_folder;
 pub(crate) mod error;
+pub(crate) mod exif;
 pub(crate) mod files;
 mod finite;
 pub(crate) mod folder_lock;

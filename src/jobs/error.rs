@@ -12,6 +12,7 @@ use crate::models::catalog::InstallError;
 use crate::models::fetch::FetchError;
 use crate::pipeline::cleaning::{CleanError, RuleError};
 use crate::pipeline::depth::DepthError;
+use crate::pipeline::locate::LocateError;
 use crate::pipeline::observer::Interrupted;
 use crate::pipeline::removal::RemovalError;
 use crate::pipeline::semantics::lifting::edit::EditError;
@@ -148,6 +149,8 @@ pub enum JobError {
     CleanRule(#[from] RuleError),
     #[error(transparent)]
     Depth(#[from] DepthError),
+    #[error(transparent)]
+    Locate(#[from] LocateError),
     #[error(transparent)]
     Gpu(#[from] GpuError),
     #[error(transparent)]

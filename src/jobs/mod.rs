@@ -33,6 +33,7 @@ pub(crate) mod go_to;
 pub(crate) mod held_out;
 pub(crate) mod import;
 pub(crate) mod inspect;
+pub(crate) mod locate;
 pub(crate) mod measurements;
 pub(crate) mod models;
 pub mod open;

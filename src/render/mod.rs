@@ -20,6 +20,7 @@ pub(crate) use cpu::adam::{AdamStep, Rates};
 pub(crate) use cpu::contributions::ContributionSink;
 pub use cpu::labels::LabelWinner;
 pub(crate) use cpu::labels::{PixelWeights, UNKNOWN};
+pub use cpu::pose_gradient::PoseGradient;
 pub(crate) use cpu::ssim::{LossParts, PhotoLoss, ssim};
 pub(crate) use cpu::{RenderStats, normals, validate};
 pub(crate) use gpu::timing::StageTimes;

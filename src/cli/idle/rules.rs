@@ -159,6 +159,9 @@ pub(super) const RULES: &[Rule] = &[
     rule(&["preprocess"], &["part_weight"], |g| when(g.is("encoder", "none"), "with --encoder none")),
     rule(&["remove"], &["paint", "seed"], |g| when(g.is("fill", "none"), "with --fill none")),
     rule(&["remove"], &["seed"], |g| when(!g.is("paint", "patches"), "here: only --paint patches chooses at random")),
+    // Poses of photos.
+    rule(&["locate"], &["check_others", "unknown_focal"], |g| when(!g.has("check"), "without --check")),
+    rule(&["locate"], &["focal_px", "out"], |g| when(g.has("check"), "with --check, which locates held-out photos")),
     // Pictures and flights.
     rule(&["render"], &["quality", "fps", "mark", "ffmpeg"], |g| when(!g.has("path"), "without --path")),
     rule(&["render"], &["quality"], |g| when(frames(g) && !g.has("ffmpeg"), "on frames, which lose nothing")),

@@ -137,6 +137,13 @@ fn header(path: &Path) -> Result<((u32, u32), ColorType), IoError> {
     }
 }
 
+/// Reads the EXIF block of a picture file; empty if it has none that can be read.
+pub(super) fn exif(path: &Path) -> Result<Vec<u8>, IoError> {
+    let bytes = read_whole(path)?;
+    let mut decoder = decoder(&bytes, path)?;
+    Ok(decoder.exif_metadata().ok().flatten().unwrap_or_default())
+}
+
 /// Returns whether a file is a gray PNG of one bit a pixel, by its first bytes; such a picture is black and white only.
 pub(super) fn is_black_and_white(path: &Path) -> Result<bool, IoError> {
     let start = files::read_start(path, 26)?;

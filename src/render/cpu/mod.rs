@@ -14,6 +14,7 @@ pub(crate) mod contributions;
 pub(crate) mod labels;
 pub mod normals;
 pub(crate) mod pack;
+pub(crate) mod pose_gradient;
 pub mod project;
 pub(crate) mod project_backward;
 mod project_chunk;

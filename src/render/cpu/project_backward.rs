@@ -13,6 +13,10 @@ pub(crate) const MOMENTS: usize = 6;
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct GaussianGradient<R> {
     pub(crate) position: [R; 3],
+    /// Share of `position` through the viewing direction, on which the color depends.
+    pub(crate) turned: [R; 3],
+    /// With respect to the camera's focal lengths, from what this Gaussian draws, per px.
+    pub(crate) focal: [R; 2],
     pub(crate) log_scale: [R; 3],
     pub(crate) quaternion: [R; 4],
     pub(crate) opacity_logit: R,
@@ -56,15 +60,19 @@ pub(crate) fn project_backward<R: Real>(
     }
 
     let z = g.local[2];
-    let mut d_local = [R::ZERO; 3];
+    let (mut d_local, mut focal) = ([R::ZERO; 3], [R::ZERO; 2]);
     for axis in 0..2 {
         let s = view.focal[axis] / z;
         let d_tangent = -s * dot(view.rows[2], d_jacobian[axis]);
-        d_local[2] -= dot(g.jacobian[axis], d_jacobian[axis]) / z;
-        // Where the tangent was clamped it does not depend on the position.
+        let along = dot(g.jacobian[axis], d_jacobian[axis]);
+        d_local[2] -= along / z;
+        focal[axis] = along / view.focal[axis] + d_mean[axis] * (g.local[axis] / z);
+        // Where the tangent was clamped it does not depend on the position, but its limit on the focal length.
         if g.tangent[axis] == g.local[axis] / z {
             d_local[axis] += d_tangent / z;
             d_local[2] -= d_tangent * g.tangent[axis] / z;
+        } else {
+            focal[axis] -= d_tangent * g.tangent[axis] / view.focal[axis];
         }
         d_local[axis] += s * d_mean[axis];
         d_local[2] -= s * (g.local[axis] / z) * d_mean[axis];
@@ -89,6 +97,8 @@ pub(crate) fn project_backward<R: Real>(
     let on_screen = [d_mean[0] * half[0], d_mean[1] * half[1]];
     Some(GaussianGradient {
         position,
+        turned,
+        focal,
         log_scale,
         quaternion: quaternion_gradient(gaussian.quaternion, &d_rotation)?,
         opacity_logit,

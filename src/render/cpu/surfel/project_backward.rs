@@ -44,6 +44,9 @@ pub(crate) fn project_backward<R: Real>(
         std::array::from_fn(|k| view.rows[0][k] * d[0] + view.rows[1][k] * d[1] + view.rows[2][k] * d[2])
     };
     let mut position = world(d_local);
+    // A longer focal length draws the same as a disk that is stretched along that axis of the camera.
+    let stretched = |k: usize| g.local[k] * d_local[k] + g.axes[0][k] * d_axes[0][k] + g.axes[1][k] * d_axes[1][k];
+    let focal = [stretched(0) / focal[0], stretched(1) / focal[1]];
     let log_scale = [dot(g.axes[0], d_axes[0]), dot(g.axes[1], d_axes[1]), R::ZERO];
     let columns = [
         world(d_axes[0]).map(|c| c * g.scale[0]),
@@ -59,9 +62,11 @@ pub(crate) fn project_backward<R: Real>(
     }
     // The projected center moves per px as the center does, whatever path the gradient took.
     let half = [R::of(view.size[0] as f64 * 0.5), R::of(view.size[1] as f64 * 0.5)];
-    let on_screen = [d_local[0] * z / focal[0] * half[0], d_local[1] * z / focal[1] * half[1]];
+    let on_screen = [d_local[0] * z / view.focal[0] * half[0], d_local[1] * z / view.focal[1] * half[1]];
     Some(GaussianGradient {
         position,
+        turned,
+        focal,
         log_scale,
         quaternion: quaternion_gradient(gaussian.quaternion, &d_rotation)?,
         // m0 is dL/dopacity times opacity; through the sigmoid that leaves 1 - sigmoid.

@@ -1,0 +1,316 @@
+//! The pose of a photo that nobody posed, in a trained scene.
+//!
+//! 1. **Coarse** ([`gallery`], [`signature`]): small renderings of the training cameras are compared with the photo by
+//!    the directions of edges, in four quarter turns and several shifts.
+//! 2. **Middle** ([`descriptor`], [`matching`], [`consensus`]): features of the photo are matched with those of the
+//!    most alike renderings, whose depth makes them points of the scene; then once more with a rendering from the pose
+//!    found. Three points give a pose ([`p3p`]), the one that most matches agree on is kept.
+//! 3. **Fine** ([`align`], [`photometric`]): the colors are aligned, from small pictures to larger ones.
+//!
+//! [`likeness`] then says how much of the photo the scene explains; a photo of something else is refused.
+
+mod align;
+mod consensus;
+mod corners;
+mod descriptor;
+mod gallery;
+mod gray;
+mod likeness;
+mod matching;
+mod p3p;
+mod photometric;
+mod pose;
+mod signature;
+
+use std::sync::Arc;
+
+use glam::DVec2;
+
+use self::align::{Aligned, Curvature, FocalBounds, STEPS, align};
+use self::consensus::{Consensus, PointMatch, consensus};
+use self::descriptor::{PictureFeature, features};
+use self::gallery::{AlikeView, FEATURES_PX, Gallery, MOST_FEATURES};
+use self::gray::GrayPlane;
+use self::likeness::{Likeness, likeness};
+use self::matching::pairs;
+use self::photometric::{PhotoLevel, WIDTH};
+use self::pose::PARAMETERS;
+use super::observer::{Interrupted, Observer};
+use crate::math::cholesky::inverse;
+use crate::render::{RenderError, RenderSettings};
+use crate::scene::{Camera, GaussianCloud, PhotoPixels};
+
+/// Longer side at which photos are loaded to be located, px.
+pub(crate) const PHOTO_PX: u32 = FEATURES_PX;
+/// Shortest side of a photo in which anything is recognized, px.
+const LEAST_PX: u32 = 32;
+/// Longer side of the pictures whose colors are aligned, from coarse to fine; the last is the caller's.
+const LEVELS_PX: [u32; 2] = [96, 192];
+/// Steps at the finest pictures at most: each takes as long as all of the coarse ones, and little is left to do.
+const FINEST_STEPS: usize = 6;
+/// Usual longer side of the finest pictures, px.
+pub(crate) const USUAL_PX: u32 = 400;
+/// Views whose features are matched at once, and such groups at most.
+const GROUP: usize = 3;
+const GROUPS: usize = 6;
+/// Places of the photo that agree on a pose, from which no more views are looked at.
+const ENOUGH: usize = 40;
+/// Places of the photo that agree on a pose, from which it is no chance: of a thousand wrong matches, one agrees with
+/// a wrong pose within [`WITHIN`].
+const SUPPORTED: usize = 12;
+/// Largest reprojection error of a match that agrees, in longer sides of the photo.
+const WITHIN: f64 = 0.006;
+/// Largest distance of matches with a rendering from about the right pose, in longer sides.
+const NEAR: f64 = 0.06;
+/// Views that are aligned without matches.
+const WITHOUT_MATCHES: usize = 4;
+/// Ratios to the usual focal length that are tried where it is not known.
+const FOCALS: [f64; 7] = [1.0, 0.8, 1.25, 0.64, 1.56, 0.5, 2.0];
+/// Largest change of a focal length that is nearly known (logarithm): rounded to mm, or cropped by stabilization.
+const NEARLY: f64 = 0.15;
+/// Largest change of an unknown one from the usual (logarithm).
+const AT_MOST: f64 = 1.1;
+/// Least share of blocks that the scene explains in a photo of it whose pose matches support: half of the photo may be
+/// hidden, and a third of the rest be too blurred.
+const EXPLAINED: f64 = 0.35;
+/// Least mean correlation of such a photo; that of pictures of other things is 0 but for the alignment's luck.
+const CORRELATION: f64 = 0.3;
+/// Least share of blocks without such support: luck does not reach it.
+const EXPLAINED_ALONE: f64 = 0.6;
+/// Pixels whose errors are alike, by which errors of a pose are larger than independent pixels had it.
+const CORRELATED_PX: f64 = 25.0;
+
+/// Error of a photo that could not be looked for.
+#[derive(Debug, thiserror::Error)]
+#[allow(missing_docs, reason = "each text says what its variant is")]
+pub enum LocateError {
+    #[error(
+        "the scene has no cameras, around which photos are looked for; open it with its photos, or give them with --photos"
+    )]
+    NoCameras,
+    #[error("{0} x {1} px are too few to recognize anything; the shorter side needs at least {LEAST_PX} px")]
+    TooSmall(u32, u32),
+    #[error(transparent)]
+    Render(#[from] RenderError),
+    #[error(transparent)]
+    Interrupted(#[from] Interrupted),
+}
+
+/// Knowledge of a photo's focal length.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum FocalKnowledge {
+    /// Held.
+    Known,
+    /// Refined a little.
+    Near,
+    /// Found with the pose; the lens has the usual one.
+    Unknown,
+}
+
+/// A pose that was found.
+#[derive(Clone, Debug)]
+pub(crate) struct FoundPlace {
+    /// Of the size of the photo's loaded pixels.
+    pub(crate) camera: Camera,
+    /// True if the photo shows the scene.
+    pub(crate) accepted: bool,
+    /// Share of the photo's blocks with structure that the scene explains.
+    pub(crate) explained: f64,
+    /// Mean correlation of these blocks.
+    pub(crate) correlation: f64,
+    /// Places of the photo that were found in the scene and agree on the pose.
+    pub(crate) agreeing: usize,
+    /// Gain of the photo's colors against the rendering's, by channel.
+    pub(crate) gain: [f32; 3],
+    /// Covariance of move (camera axes, scene units), turn (radians) and logarithm of the focal length; `None` where
+    /// the photo does not determine the pose.
+    pub(crate) covariance: Option<Curvature>,
+}
+
+impl FoundPlace {
+    /// Standard deviations of the place (scene units) and the turn (degrees).
+    pub(crate) fn deviations(&self) -> Option<(f64, f64)> {
+        let c = self.covariance.as_ref()?;
+        let of = |first: usize| (first..first + 3).map(|i| c[i][i]).sum::<f64>().max(0.0).sqrt();
+        Some((of(0), of(3).to_degrees()))
+    }
+}
+
+/// A scene in which photos are located, with what was rendered of it before.
+pub(crate) struct Locator {
+    gallery: Gallery,
+    finest_px: u32,
+}
+
+impl Locator {
+    /// Renders the scene from `cameras`, those that it was trained on. Colors are aligned at `finest_px` at last.
+    pub(crate) fn new(
+        cloud: Arc<GaussianCloud>,
+        settings: &RenderSettings,
+        cameras: &[Camera],
+        finest_px: u32,
+        observer: &mut dyn Observer,
+    ) -> Result<Self, LocateError> {
+        if cameras.is_empty() {
+            return Err(LocateError::NoCameras);
+        }
+        Ok(Self { gallery: Gallery::new(cloud, settings, cameras, observer)?, finest_px })
+    }
+
+    /// The usual focal length of the scene's cameras, in longer sides of their pictures.
+    pub(crate) fn usual_focal_sides(&self) -> f64 {
+        self.gallery.usual_focal_sides()
+    }
+
+    /// Locates a photo of at most [`PHOTO_PX`]; `lens` has its size, lens and any pose.
+    pub(crate) fn locate(
+        &mut self,
+        photo: &PhotoPixels,
+        lens: &Camera,
+        focal: FocalKnowledge,
+        observer: &dyn Observer,
+    ) -> Result<FoundPlace, LocateError> {
+        let (width, height) = (photo.width_px, photo.height_px);
+        if width.min(height) < LEAST_PX {
+            return Err(LocateError::TooSmall(width, height));
+        }
+        let gray = GrayPlane::of_photo(photo);
+        let alike = self.gallery.alike(&gray, lens);
+        let seen = features(&gray, MOST_FEATURES);
+        let within_px = WITHIN * f64::from(width.max(height));
+        let focals = if focal == FocalKnowledge::Unknown { &FOCALS[..] } else { &FOCALS[..1] };
+        let (found, agreeing) = self.by_matches(&seen, &alike, lens, focals, within_px, observer)?;
+        let mut starts: Vec<Camera> = found.map(|f| f.camera).into_iter().collect();
+        if agreeing < SUPPORTED {
+            starts.extend(alike.into_iter().take(WITHOUT_MATCHES).map(|view| view.pose));
+        }
+        let (aligned, level) = self.aligned(photo, lens, starts, focal, observer)?;
+        let Likeness { explained, correlation } = compare(&aligned, &level);
+        let accepted = match agreeing >= SUPPORTED {
+            true => explained >= EXPLAINED && correlation >= CORRELATION,
+            false => explained >= EXPLAINED_ALONE,
+        };
+        Ok(FoundPlace {
+            camera: aligned.camera.resized(width, height),
+            accepted,
+            explained,
+            correlation,
+            agreeing,
+            gain: aligned.exposure.gain,
+            covariance: covariance(&aligned.curvature, focal),
+        })
+    }
+
+    /// The pose that most matches agree on, and the number of places of the photo that do.
+    fn by_matches(
+        &mut self,
+        seen: &[PictureFeature],
+        alike: &[AlikeView],
+        lens: &Camera,
+        focals: &[f64],
+        within_px: f64,
+        observer: &dyn Observer,
+    ) -> Result<(Option<Consensus>, usize), LocateError> {
+        let mut best: (Option<Consensus>, usize) = (None, 0);
+        for group in alike.chunks(GROUP).take(GROUPS) {
+            observer.proceed()?;
+            let mut matches = Vec::new();
+            for view in group {
+                let known = self.gallery.features(view.view)?;
+                let found = pairs(seen, &known, |_, _| true);
+                matches.extend(found.into_iter().map(|(i, j)| PointMatch { pixel: seen[i].at, world: known[j].world }));
+            }
+            keep_better(&mut best, consensus(&matches, lens, focals, within_px), &matches);
+            if best.1 >= ENOUGH {
+                break;
+            }
+        }
+        // From about the right place nearly everything looks alike, and nearly nothing else is near.
+        if let (Some(found), SUPPORTED..) = (&best.0, best.1) {
+            observer.proceed()?;
+            let near = NEAR * within_px / WITHIN;
+            let known = self.gallery.features_from(&found.camera)?;
+            let pairs = pairs(seen, &known, |a: DVec2, b: DVec2| a.distance_squared(b) < near * near);
+            let matches: Vec<PointMatch> =
+                pairs.into_iter().map(|(i, j)| PointMatch { pixel: seen[i].at, world: known[j].world }).collect();
+            let spread = [1.0, 0.94, 1.06];
+            let focals = if focals.len() > 1 { &spread[..] } else { &spread[..1] };
+            let lens = Camera { focal_px: found.camera.focal_px, ..lens.clone() };
+            keep_better(&mut best, consensus(&matches, &lens, focals, within_px), &matches);
+        }
+        Ok(best)
+    }
+
+    /// The best of the poses after alignment, and the photo at that size.
+    fn aligned(
+        &mut self,
+        photo: &PhotoPixels,
+        lens: &Camera,
+        starts: Vec<Camera>,
+        focal: FocalKnowledge,
+        observer: &dyn Observer,
+    ) -> Result<(Aligned, PhotoLevel), LocateError> {
+        let most = match focal {
+            FocalKnowledge::Known => None,
+            FocalKnowledge::Near => Some(NEARLY),
+            FocalKnowledge::Unknown => Some(AT_MOST),
+        };
+        let sizes: Vec<u32> = LEVELS_PX.into_iter().filter(|px| *px < self.finest_px).chain([self.finest_px]).collect();
+        let mut starts = starts;
+        let mut last = None;
+        for px in sizes {
+            let size = lens.limited_to(px);
+            let level = PhotoLevel::of(photo, size.width_px as usize, size.height_px as usize);
+            let mut best: Option<(f64, Aligned)> = None;
+            for start in &starts {
+                observer.proceed()?;
+                let start = start.resized(size.width_px, size.height_px);
+                let changed = (start.focal_px.x / size.focal_px.x).ln();
+                let bounds: FocalBounds = most.map(|most| [-most - changed, most - changed]);
+                let steps = if px == self.finest_px { FINEST_STEPS } else { STEPS };
+                let aligned = align(&mut self.gallery, &level, &start, bounds, steps)?;
+                let Likeness { explained, correlation } = compare(&aligned, &level);
+                if best.as_ref().is_none_or(|(most, _)| explained + correlation > *most) {
+                    best = Some((explained + correlation, aligned));
+                }
+            }
+            let Some((_, aligned)) = best else { return Err(LocateError::NoCameras) };
+            starts = vec![aligned.camera.clone()];
+            last = Some((aligned, level));
+        }
+        last.ok_or(LocateError::NoCameras)
+    }
+}
+
+/// Keeps the pose on which more places of the photo agree.
+fn keep_better(best: &mut (Option<Consensus>, usize), found: Option<Consensus>, matches: &[PointMatch]) {
+    let Some(found) = found else { return };
+    // A place that matches points of several views counts once.
+    let mut places: Vec<[u64; 2]> =
+        found.inliers.iter().map(|&i| matches[i].pixel.to_array().map(f64::to_bits)).collect();
+    places.sort_unstable();
+    places.dedup();
+    if places.len() > best.1 {
+        *best = (Some(found), places.len());
+    }
+}
+
+/// Likeness of a rendering at its pose, in the photo's exposure, with the photo.
+fn compare(aligned: &Aligned, level: &PhotoLevel) -> Likeness {
+    let rendered = GrayPlane::of_planes(&aligned.exposure.applied(&aligned.frame.color), level.width);
+    likeness(&rendered, &GrayPlane::of_planes(&level.planes, level.width), &level.coverage)
+}
+
+/// Covariance of a pose from the curvature of the loss there.
+fn covariance(curvature: &Curvature, focal: FocalKnowledge) -> Option<Curvature> {
+    // The loss is in units of its width, and errors of neighboring pixels are alike.
+    let scale = CORRELATED_PX / f64::from(WIDTH * WIDTH);
+    let mut out = inverse(curvature)?.map(|row| row.map(|v| v * scale));
+    if focal == FocalKnowledge::Known {
+        out[PARAMETERS - 1][PARAMETERS - 1] = 0.0;
+    }
+    Some(out)
+}
+
+#[cfg(test)]
+mod tests;
