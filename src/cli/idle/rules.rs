@@ -116,7 +116,7 @@ pub(super) const RULES: &[Rule] = &[
     rule(&["segment"], &["no_measure"], |g| when(g.has("all"), "with --all, which measures nothing")),
     rule(&["segment"], &["no_measure"], |g| when(!g.has("out"), "without --out")),
     // Measures.
-    rule(&["eval"], &["protocol", "query", "decoder"], |g| when(!g.has("masks"), "without --masks")),
+    rule(&["eval"], &["protocol", "query", "decoder", "encoder"], |g| when(!g.has("masks"), "without --masks")),
     rule(&["eval"], RECIPE, |g| {
         when(!g.has_any(&["masks", "questions"]), "without --masks or --questions: nothing is asked for")
     }),

@@ -5,10 +5,17 @@ use std::sync::Arc;
 
 use super::Scene;
 use crate::io::gs_output::{self, GsOutput};
-use crate::io::results::{self, MethodKind, MethodResult, ResultOptions};
+use crate::io::results::{self, Method, MethodKind, MethodResult, ResultOptions};
 use crate::io::{self, Opened, files, trainings};
 use crate::jobs::JobError;
 use crate::scene::{Axes, GaussianCloud};
+
+impl Scene {
+    /// Name of the method that made it, if it is a result of another one.
+    pub(crate) fn method_name(&self) -> Option<&'static str> {
+        self.method.map(Method::name)
+    }
+}
 
 /// Opens the result of another method; `None` if the path is none. Classes and clusters are read at once; embeddings
 /// are not, as they can be larger than the Gaussians.
@@ -56,7 +63,6 @@ fn with_result(path: &Path, mut result: MethodResult, beside: GsOutput) -> Scene
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::io::results::Method;
     use crate::io::results::tests::samples;
     use crate::jobs::open;
 

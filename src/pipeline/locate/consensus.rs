@@ -156,7 +156,7 @@ mod tests {
     /// Points of a made-up scene as a camera sees them, `wrong` of them at random places.
     fn made_up(camera: &Camera, n: usize, wrong: usize, noise_px: f64) -> Vec<PointMatch> {
         let mut rng = Pcg64Mcg::seed_from_u64(8);
-        let mut v = |scale: f64| rng.random_range(-scale..scale);
+        let mut v = |scale: f64| rng.random_range(-scale..=scale);
         (0..n)
             .map(|i| {
                 let world = DVec3::new(v(1.2), v(1.2), v(1.0));

@@ -9,6 +9,8 @@ use crate::math::vector::dot;
 
 /// Largest ratio of the distances to the nearest and the second nearest descriptor (Lowe: 0.8).
 const RATIO: f32 = 0.85;
+/// Largest squared distance of descriptors that match, for where there is no second.
+const FARTHEST: f32 = 1.0;
 /// Two features nearer than this in their picture are one: neither is the other's rival, px.
 const SAME_PX: f64 = 4.0;
 
@@ -48,7 +50,7 @@ pub(super) fn pairs(
                 rival = d;
             }
         }
-        (best.1 != usize::MAX && best.0 < RATIO * RATIO * rival).then_some((i, best.1))
+        (best.1 != usize::MAX && best.0 < FARTHEST.min(RATIO * RATIO * rival)).then_some((i, best.1))
     };
     let found: Vec<(usize, usize)> = (0..photo.len()).into_par_iter().filter_map(nearest).collect();
     let mutual = |&(i, j): &(usize, usize)| {

@@ -44,6 +44,7 @@ pub(in crate::ui) fn open(app: &mut App, path: PathBuf) {
 /// Closes a scene beside the current one, or all.
 pub(in crate::ui) fn close(app: &mut App, path: Option<&Path>) {
     app.state.beside.retain(|other| path.is_some_and(|path| other.path != path));
+    app.layout.split_view &= !app.state.beside.is_empty();
 }
 
 pub(in crate::ui) fn choose_sheet_folder(app: &mut App) {

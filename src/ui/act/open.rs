@@ -26,7 +26,7 @@ const SCENES: [&str; 18] = [
 ];
 
 pub(in crate::ui) fn choose_folder(app: &mut App) {
-    let request = FileRequest::folder(FileKind::Photos, "Open photos or a scene");
+    let request = FileRequest::folder(FileKind::Photos, "Open photos, a scene or a result");
     app.choose(request, |app, path| app.ask(Action::Open(path)));
 }
 
@@ -58,6 +58,8 @@ pub(in crate::ui) fn open(app: &mut App, path: PathBuf) {
                     if is_kin || is_same_place(&app.state, &scene) {
                         app.viewport.keep_place();
                     }
+                    // With what was compared, its views go.
+                    app.layout.split_view &= app.state.beside.is_empty();
                     app.state.opened(*scene, false);
                 }
                 OpenedPath::Unposed(photos) => app.state.unposed = Some(photos),

@@ -56,9 +56,12 @@ impl PaneContents for ObjectsPane {
         };
         let identities = &map.identities;
         let conflicts = map.findings.as_ref().map_or(0, |f| f.conflicts().len());
-        let from = match map.seeds.len() {
-            0 => "selected by hand".to_owned(),
-            n => format!("from the masks of {}", things(n, "photo")),
+        let method = state.scene.as_ref().and_then(|scene| scene.method_name());
+        let from = match (map.seeds.len(), method) {
+            (0, Some(name)) => format!("from the result of {name}"),
+            (0, None) if identities.iter().all(|(_, i)| i.by_hand) => "selected by hand".to_owned(),
+            (0, None) => "as they were opened".to_owned(),
+            (n, _) => format!("from the masks of {}", things(n, "photo")),
         };
         ui.weak(format!("{}, {from}", identities.counted()));
         if conflicts > 0 {
