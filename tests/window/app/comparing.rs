@@ -32,7 +32,7 @@ fn one_phrase_is_asked_of_all_scenes() {
     assert!(!w.shows("Scale of relevancy"), "the control: one scene has its own queries");
     let again = folder.path().join("again");
     copy(&folder.path().join("scene"), &again);
-    let result = sample("langsplat/output", folder.path());
+    let result = sample("langsplat", folder.path()).join("output");
     open_beside(&mut w, again.clone(), 1);
     open_beside(&mut w, result.clone(), 2);
     assert!(w.shows("Scale of relevancy") && w.shows("again") && w.shows("LangSplat: "));
@@ -100,7 +100,7 @@ fn four_scenes_are_compared_at_most_and_the_sheet_is_written_once() {
 #[test]
 fn a_result_with_embeddings_alone_is_asked_in_its_view() {
     let folder = tempfile::tempdir().expect("folder");
-    let mut w = Window::new(Some(Action::Open(sample("langsplat/output", folder.path()))));
+    let mut w = Window::new(Some(Action::Open(sample("langsplat", folder.path()).join("output"))));
     w.until("a picture", |a| a.viewport.picture().is_some_and(|p| p.full));
     w.harness.run_steps(2);
     assert!(w.shows("Scale of relevancy"));

@@ -360,7 +360,7 @@ fn quitting_while_a_job_runs_asks_once() {
     w.harness.state_mut().layout.config.steps = 50_000;
     w.ask(Action::StartTraining);
     w.until("training", |a| a.state.is_training());
-    assert!(!close(&mut w) && w.shows("goes on from its last checkpoint"));
+    assert!(!close(&mut w) && w.shows("It is saved, and can be continued"));
     w.click("Keep running");
     assert!(w.app().state.is_training() && !w.shows("still running"));
     close(&mut w);
