@@ -75,6 +75,11 @@ impl FindDialog {
             let text = "These photos have no masks. The segmenter decides which objects are found, the text encoder \
                         which words find them.";
             ui.label(RichText::new(text).color(theme::weak()));
+            let masks = ui.button("Masks from files\u{2026}").on_hover_text(Action::ChooseMasks.tooltip());
+            if masks.clicked() {
+                cx.ask(Action::ChooseMasks);
+                self.open = false;
+            }
             let Some(known) = &state.models else {
                 ui.add_space(8.0);
                 ui.weak("Looking for models\u{2026}");
@@ -85,7 +90,7 @@ impl FindDialog {
             // A dialog gets little height before the size of its content is known.
             let list_pt = (room.y - 230.0).max(120.0);
             ScrollArea::vertical().max_height(list_pt).min_scrolled_height(list_pt).show(ui, |ui| {
-                self.choices(ui, known, &means, cx);
+                self.choices(ui, known, &means);
                 self.engine(ui, known, &means);
             });
             ui.add_space(6.0);
@@ -119,7 +124,7 @@ impl FindDialog {
         known.is_fast || !known.is_settled && !self.without_engine && missing_engine(known).is_some()
     }
 
-    fn choices(&mut self, ui: &mut Ui, known: &ModelList, means: &Means, cx: &mut Ctx<'_>) {
+    fn choices(&mut self, ui: &mut Ui, known: &ModelList, means: &Means) {
         ui.add_space(6.0);
         ui.label(RichText::new("Segmenter").strong());
         let text = "Rough: an object of two colors is split, neighbors of one color are merged.";
@@ -128,11 +133,6 @@ impl FindDialog {
         }
         if let Some(id) = networks(ui, known, self.is_fast(known), ModelRole::Segmenter, &means.segmenter) {
             self.segmenter = Some(id);
-        }
-        let masks = ui.button("Masks from files\u{2026}").on_hover_text(Action::ChooseMasks.tooltip());
-        if masks.clicked() {
-            cx.ask(Action::ChooseMasks);
-            self.open = false;
         }
         ui.add_space(8.0);
         ui.label(RichText::new("Text encoder").strong());

@@ -91,7 +91,9 @@ fn delete(app: &mut App, folder: PathBuf) {
         app.photos.runs.refresh();
         // What was deleted is not worked on any more.
         if let Some(scene) = app.state.scene.as_ref().filter(|s| s.out == folder) {
-            let photos = scene.dataset.as_ref().map(|d| d.source().to_path_buf());
+            // The photos of a training stay; of any other scene, the one before is gone on with.
+            let is_training = scene.runs.iter().any(|run| run.folder == folder);
+            let photos = scene.dataset.as_ref().filter(|_| is_training).map(|d| d.source().to_path_buf());
             let next = photos.filter(|path| path.exists()).or_else(|| app.state.recent.first().cloned());
             app.ask(next.map_or(Action::OpenDemo, Action::Open));
         }
