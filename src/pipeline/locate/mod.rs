@@ -2,12 +2,12 @@
 //!
 //! 1. **Coarse** ([`gallery`], [`signature`]): small renderings of the training cameras are compared with the photo by
 //!    the directions of edges, in four quarter turns and several shifts.
-//! 2. **Middle** ([`descriptor`], [`matching`], [`consensus`]): features of the photo are matched with those of the
+//! 2. **Middle** ([`descriptor`], [`matching`], [`mod@consensus`]): features of the photo are matched with those of the
 //!    most alike renderings, whose depth makes them points of the scene; then once more with a rendering from the pose
 //!    found. Three points give a pose ([`p3p`]), the one that most matches agree on is kept.
-//! 3. **Fine** ([`align`], [`photometric`]): the colors are aligned, from small pictures to larger ones.
+//! 3. **Fine** ([`mod@align`], [`photometric`]): the colors are aligned, from small pictures to larger ones.
 //!
-//! [`likeness`] then says how much of the photo the scene explains; a photo of something else is refused.
+//! [`mod@likeness`] then says how much of the photo the scene explains; a photo of something else is refused.
 
 mod align;
 mod consensus;
