@@ -252,6 +252,12 @@ const LINES: &[(&str, &[&str], &str)] = &[
         &["--title t", "--path p.json"],
         "export s --html p.html --title t --path p.json",
     ),
+    (
+        "locate s a.jpg {}",
+        &["--check-others o", "--unknown-focal"],
+        "locate s --check --check-others o --unknown-focal",
+    ),
+    ("locate s --check {}", &["--focal-px 9", "--out t.json"], "locate s a.jpg --focal-px 9 --out t.json"),
     ("export s --html p.html {}", &["--no-measure"], "export s --html p.html --out a.ply --no-measure"),
     ("agent s hi {}", &["--url u", "--model m", "--key-variable k"], "agent s hi --planner llm --url u --model m"),
     ("agent --find-model {}", &["--url u", "--from 0", "--transcript t.md", "--by names"], "agent --find-model --json"),
