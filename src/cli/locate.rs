@@ -8,7 +8,7 @@ use super::progress::Console;
 use super::scene_args::open_scene;
 use super::{CliError, number, output};
 use crate::jobs::Scene;
-use crate::jobs::locate::check::{self, CheckSummary, LocateCheck, LocateCheckOptions};
+use crate::jobs::locate::check::{self, CheckSummary, CheckedPicture, LocateCheck, LocateCheckOptions};
 use crate::jobs::locate::{self, DEFAULT_PX, LocateOptions, LocatedPhoto, MOST_PX, write};
 use crate::math::format;
 
@@ -138,30 +138,18 @@ fn measure(args: &LocateArgs, scene: &Scene, mut console: Console) -> Result<(),
 fn report(found: &LocateCheck) -> String {
     let head = ["photo", "center %", "degrees", "explained %", "correlation", "agree", "s", ""];
     let mut rows = vec![head.map(str::to_owned).to_vec()];
-    for p in &found.photos {
-        rows.push(vec![
-            p.name.clone(),
-            format!("{:.3}", 100.0 * p.center_error),
-            format!("{:.3}", p.rotation_error_deg),
-            format!("{:.0}", 100.0 * p.explained),
-            format!("{:.2}", p.correlation),
-            p.agreeing.to_string(),
-            format!("{:.1}", p.secs),
-            if p.accepted { String::new() } else { "refused".into() },
-        ]);
-    }
-    for o in found.others.iter().chain(&found.noises).filter(|o| o.accepted) {
-        rows.push(vec![
-            o.name.clone(),
-            String::new(),
-            String::new(),
-            format!("{:.0}", 100.0 * o.explained),
-            format!("{:.2}", o.correlation),
-            o.agreeing.to_string(),
-            format!("{:.1}", o.secs),
-            "accepted wrongly".into(),
-        ]);
-    }
+    let row = |p: &CheckedPicture, errors: [String; 2], remark: &str| {
+        let [center, turn] = errors;
+        let explained = format!("{:.0}", 100.0 * p.explained);
+        let (correlation, secs) = (format!("{:.2}", p.correlation), format!("{:.1}", p.secs));
+        vec![p.name.clone(), center, turn, explained, correlation, p.agreeing.to_string(), secs, remark.to_owned()]
+    };
+    rows.extend(found.photos.iter().map(|p| {
+        let errors = [100.0 * p.center_error, p.rotation_error_deg].map(|error| format!("{error:.3}"));
+        row(&p.picture, errors, if p.picture.accepted { "" } else { "refused" })
+    }));
+    let wrong = found.others.iter().chain(&found.noises).filter(|o| o.accepted);
+    rows.extend(wrong.map(|o| row(o, Default::default(), "accepted wrongly")));
     let CheckSummary { photos, accepted, within_bounds: [good, right], accepted_wrongly, .. } = found.summary;
     let [center, turn, secs] = [found.summary.center_error, found.summary.rotation_error_deg, found.summary.secs];
     let mut text = output::table(&rows);

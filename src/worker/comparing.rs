@@ -175,13 +175,14 @@ mod tests {
     use super::*;
     use crate::io::results::Method;
     use crate::io::results::tests::{expected, samples};
-    use crate::jobs::open;
+    use crate::jobs::{Scene, open};
     use crate::math::stats::worst_difference;
     use crate::pipeline::semantics::query::recipe::LERFS_PHRASES;
 
     fn asked(path: &str) -> Versioned<AskableScene> {
         let method = if path == "saga" { Method::Saga } else { Method::LangSplat };
-        Versioned::new(Arc::new(AskableScene::Result(samples().join(path), method)))
+        let scene = Scene { path: samples().join(path), method: Some(method), ..Scene::default() };
+        Versioned::new(Arc::new(AskableScene::Result(Box::new(scene), method)))
     }
 
     #[test]

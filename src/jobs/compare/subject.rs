@@ -10,7 +10,7 @@ use crate::io::IoError;
 use crate::io::results::{Method, MethodKind, MethodResult, ResultOptions, open_result};
 use crate::io::trained::{self, SceneCamera};
 use crate::jobs::query::{BY_IDENTITY, QueryEngine, ViewMaps, seen_from};
-use crate::jobs::{JobError, Scene, open};
+use crate::jobs::{JobError, Scene, ask_result, open};
 use crate::pipeline::semantics::evaluation::langsplat;
 use crate::pipeline::semantics::query::foreign::asked::{ForeignScene, ForeignView};
 use crate::pipeline::semantics::query::foreign::own_rules::ForeignMask;
@@ -31,7 +31,7 @@ pub(crate) enum AskableScene {
     /// A scene with objects.
     Own(Box<Scene>, Arc<SemanticMap>),
     /// A result of a method.
-    Result(PathBuf, Method),
+    Result(Box<Scene>, Method),
 }
 
 impl AskableScene {
@@ -39,7 +39,7 @@ impl AskableScene {
     pub(crate) fn of(scene: &Scene, map: Option<&Arc<SemanticMap>>) -> Option<Self> {
         let by_objects = || map.map(|map| Self::Own(Box::new(scene.clone()), Arc::clone(map)));
         let Some(method) = scene.method else { return by_objects() };
-        let by_values = || Some(Self::Result(scene.path.clone(), method));
+        let by_values = || Some(Self::Result(Box::new(scene.clone()), method));
         match method.kind() {
             MethodKind::Embeddings | MethodKind::Clusters => by_values(),
             MethodKind::Affinities => by_objects().or_else(by_values),
@@ -53,10 +53,11 @@ impl AskableScene {
     /// If it cannot be read, or the encoder of its objects is not here.
     pub(crate) fn open(&self, encoder: Option<&str>) -> Result<CompareSubject, JobError> {
         match self {
-            Self::Own(scene, map) => CompareSubject::own((**scene).clone(), (**map).clone()),
-            Self::Result(path, method) => {
+            Self::Own(scene, map) => CompareSubject::own((**scene).clone(), Arc::clone(map)),
+            Self::Result(scene, method) => {
                 let encoder = encoder.filter(|_| method.encoder().is_some()).map(str::to_owned);
-                CompareSubject::open(path, &ResultOptions { encoder, ..ResultOptions::default() })
+                let result = ask_result::read(scene, &ResultOptions { encoder, ..ResultOptions::default() })?;
+                Ok(CompareSubject::of_result(result, &scene.path))
             }
         }
     }
@@ -122,10 +123,11 @@ impl CompareSubject {
     }
 
     /// The result of another method.
-    pub(crate) fn of_result(result: MethodResult, path: &Path) -> Self {
+    pub(crate) fn of_result(result: impl Into<Arc<MethodResult>>, path: &Path) -> Self {
+        let result = result.into();
         let (name, encoder) = (result.method.name().to_owned(), result.encoder.clone());
         let (cameras, cloud) = (result.cameras.clone(), result.cloud.clone());
-        let scene = ForeignScene::new(Arc::new(result));
+        let scene = ForeignScene::new(result);
         let answers: Box<dyn PhraseAnswers> = match scene.has_named_classes() {
             true => Box::new(ClassAnswers::new(scene)),
             false => Box::new(ForeignAnswers { scene, renderer: Renderer::new(), view: None }),
@@ -146,7 +148,8 @@ impl CompareSubject {
     ///
     /// # Errors
     /// If the encoder of its objects is not here.
-    pub(crate) fn own(scene: Scene, map: SemanticMap) -> Result<Self, JobError> {
+    pub(crate) fn own(scene: Scene, map: impl Into<Arc<SemanticMap>>) -> Result<Self, JobError> {
+        let map = map.into();
         let recipe = QueryConfig::default();
         let engine = QueryEngine::new(map.language.as_ref(), recipe)?;
         Ok(Self {
@@ -251,7 +254,7 @@ impl PhraseAnswers for ForeignAnswers {
 /// A scene of this program with the maps of its view.
 struct OwnAnswers {
     scene: Scene,
-    map: SemanticMap,
+    map: Arc<SemanticMap>,
     engine: QueryEngine,
     maps: Option<ViewMaps>,
 }

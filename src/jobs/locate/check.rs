@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 use std::time::Instant;
 
-use glam::{DMat3, DQuat, DVec2, DVec3};
+use glam::{DMat3, DVec2, DVec3};
 use rand::{RngExt, SeedableRng};
 use serde::Serialize;
 
@@ -14,7 +14,8 @@ use crate::jobs::held_out::held_out;
 use crate::jobs::{JobError, Scene, open};
 use crate::math::resize::{Filter, resize};
 use crate::math::stats::{median, quantile};
-use crate::pipeline::locate::{FocalKnowledge, LocateError, PHOTO_PX};
+use crate::navigate::pose::angle;
+use crate::pipeline::locate::{FocalKnowledge, FoundPlace, LocateError, PHOTO_PX};
 use crate::pipeline::observer::{Observer, Ticker};
 use crate::scene::{Camera, Dataset, PhotoPixels};
 
@@ -36,11 +37,22 @@ pub(crate) struct LocateCheckOptions {
     pub(crate) unknown_focal: bool,
 }
 
+/// A picture that was located, without its pose.
+#[derive(Clone, Debug, Serialize)]
+pub(crate) struct CheckedPicture {
+    pub(crate) name: String,
+    pub(crate) accepted: bool,
+    pub(crate) explained: f64,
+    pub(crate) correlation: f64,
+    pub(crate) agreeing: usize,
+    pub(crate) secs: f64,
+}
+
 /// A photo whose pose was hidden.
 #[derive(Clone, Debug, Serialize)]
 pub(crate) struct CheckedPhoto {
-    pub(crate) name: String,
-    pub(crate) accepted: bool,
+    #[serde(flatten)]
+    pub(crate) picture: CheckedPicture,
     /// Error of the center, in radii of the scene.
     pub(crate) center_error: f64,
     pub(crate) rotation_error_deg: f64,
@@ -49,21 +61,6 @@ pub(crate) struct CheckedPhoto {
     /// Standard deviation of the center that was told, in radii of the scene.
     pub(crate) center_deviation: Option<f64>,
     pub(crate) rotation_deviation_deg: Option<f64>,
-    pub(crate) explained: f64,
-    pub(crate) correlation: f64,
-    pub(crate) agreeing: usize,
-    pub(crate) secs: f64,
-}
-
-/// A picture that does not show the scene.
-#[derive(Clone, Debug, Serialize)]
-pub(crate) struct CheckedOther {
-    pub(crate) name: String,
-    pub(crate) accepted: bool,
-    pub(crate) explained: f64,
-    pub(crate) correlation: f64,
-    pub(crate) agreeing: usize,
-    pub(crate) secs: f64,
 }
 
 /// Medians, 95 % quantiles and counts.
@@ -89,19 +86,14 @@ pub(crate) struct CheckSummary {
 #[derive(Clone, Debug, Serialize)]
 pub(crate) struct LocateCheck {
     pub(crate) photos: Vec<CheckedPhoto>,
-    pub(crate) others: Vec<CheckedOther>,
-    pub(crate) noises: Vec<CheckedOther>,
+    /// Pictures that do not show the scene.
+    pub(crate) others: Vec<CheckedPicture>,
+    pub(crate) noises: Vec<CheckedPicture>,
     pub(crate) summary: CheckSummary,
     /// Largest distance of a training camera from the middle of all, scene units.
     pub(crate) radius: f64,
     /// Seconds of looking at the scene, once for all photos.
     pub(crate) prepare_secs: f64,
-}
-
-/// Angle between two rotations, degrees.
-fn angle_deg(a: &DMat3, b: &DMat3) -> f64 {
-    let q = DQuat::from_mat3(&(a.transpose() * *b));
-    2.0 * q.xyz().length().atan2(q.w.abs()).to_degrees()
 }
 
 impl LocateJob {
@@ -120,22 +112,40 @@ impl LocateJob {
             pixels => pixels?,
         };
         let truth = photo.camera.resized(pixels.width_px, pixels.height_px);
-        let (lens, focal) = self.hidden(&truth, unknown_focal);
-        let found = self.locator.locate(&pixels, &lens, focal, observer)?;
+        let (picture, found) = self.located(photo.name.clone(), &pixels, &truth, unknown_focal, start, observer)?;
+        let turn = angle(&found.camera.world_from_camera, &truth.world_from_camera);
         let deviations = found.deviations();
         Ok(Some(CheckedPhoto {
-            name: photo.name.clone(),
-            accepted: found.accepted,
+            picture,
             center_error: found.camera.center.distance(truth.center) / self.radius,
-            rotation_error_deg: angle_deg(&found.camera.world_from_camera, &truth.world_from_camera),
+            rotation_error_deg: turn.to_degrees(),
             focal_ratio: found.camera.focal_px.x / truth.focal_px.x,
             center_deviation: deviations.map(|d| d.0 / self.radius),
             rotation_deviation_deg: deviations.map(|d| d.1),
+        }))
+    }
+
+    /// Locates a picture by a camera without its pose; the time counts from `start`.
+    fn located(
+        &mut self,
+        name: String,
+        pixels: &PhotoPixels,
+        truth: &Camera,
+        unknown_focal: bool,
+        start: Instant,
+        observer: &dyn Observer,
+    ) -> Result<(CheckedPicture, FoundPlace), LocateError> {
+        let (lens, focal) = self.hidden(truth, unknown_focal);
+        let found = self.locator.locate(pixels, &lens, focal, observer)?;
+        let picture = CheckedPicture {
+            name,
+            accepted: found.accepted,
             explained: found.explained,
             correlation: found.correlation,
             agreeing: found.agreeing,
             secs: start.elapsed().as_secs_f64(),
-        }))
+        };
+        Ok((picture, found))
     }
 
     /// The camera without its pose, and without its focal length if that is to be hidden.
@@ -157,21 +167,11 @@ impl LocateJob {
         truth: &Camera,
         unknown_focal: bool,
         observer: &dyn Observer,
-    ) -> Result<Option<CheckedOther>, JobError> {
-        let start = Instant::now();
-        let (lens, focal) = self.hidden(truth, unknown_focal);
-        let found = match self.locator.locate(pixels, &lens, focal, observer) {
-            Err(LocateError::TooSmall(..)) => return Ok(None),
-            found => found?,
-        };
-        Ok(Some(CheckedOther {
-            name,
-            accepted: found.accepted,
-            explained: found.explained,
-            correlation: found.correlation,
-            agreeing: found.agreeing,
-            secs: start.elapsed().as_secs_f64(),
-        }))
+    ) -> Result<Option<CheckedPicture>, JobError> {
+        match self.located(name, pixels, truth, unknown_focal, Instant::now(), observer) {
+            Err(LocateError::TooSmall(..)) => Ok(None),
+            found => Ok(Some(found?.0)),
+        }
     }
 }
 
@@ -237,22 +237,22 @@ fn noise(camera: &Camera, spot_px: usize, seed: u64) -> PhotoPixels {
     PhotoPixels { width_px: camera.width_px, height_px: camera.height_px, rgb, coverage: None, alpha: None }
 }
 
-fn summary(photos: &[CheckedPhoto], others: &[CheckedOther], noises: &[CheckedOther]) -> CheckSummary {
+fn summary(photos: &[CheckedPhoto], others: &[CheckedPicture], noises: &[CheckedPicture]) -> CheckSummary {
     let is_within =
         |p: &CheckedPhoto, (center, turn): (f64, f64)| p.center_error <= center && p.rotation_error_deg <= turn;
     let both = |of: fn(&CheckedPhoto) -> f64| {
         let values: Vec<f64> = photos.iter().map(of).collect();
         if values.is_empty() { [0.0; 2] } else { [median(&values), quantile(&values, 0.95)] }
     };
-    let accepted = |list: &[CheckedOther]| list.iter().filter(|o| o.accepted).count();
+    let accepted = |list: &[CheckedPicture]| list.iter().filter(|o| o.accepted).count();
     CheckSummary {
         photos: photos.len(),
-        accepted: photos.iter().filter(|p| p.accepted).count(),
+        accepted: photos.iter().filter(|p| p.picture.accepted).count(),
         within_bounds: BOUNDS.map(|bounds| photos.iter().filter(|p| is_within(p, bounds)).count()),
-        accepted_wrongly: photos.iter().filter(|p| p.accepted && !is_within(p, BOUNDS[1])).count(),
+        accepted_wrongly: photos.iter().filter(|p| p.picture.accepted && !is_within(p, BOUNDS[1])).count(),
         center_error: both(|p| p.center_error),
         rotation_error_deg: both(|p| p.rotation_error_deg),
-        secs: both(|p| p.secs),
+        secs: both(|p| p.picture.secs),
         others: others.len(),
         others_accepted: accepted(others),
         noises: noises.len(),
@@ -265,18 +265,15 @@ mod tests {
     use super::*;
 
     fn photo(center_error: f64, rotation_error_deg: f64, accepted: bool) -> CheckedPhoto {
+        let picture =
+            CheckedPicture { name: String::new(), accepted, explained: 1.0, correlation: 1.0, agreeing: 9, secs: 2.0 };
         CheckedPhoto {
-            name: String::new(),
-            accepted,
+            picture,
             center_error,
             rotation_error_deg,
             focal_ratio: 1.0,
             center_deviation: None,
             rotation_deviation_deg: None,
-            explained: 1.0,
-            correlation: 1.0,
-            agreeing: 9,
-            secs: 2.0,
         }
     }
 
@@ -291,6 +288,7 @@ mod tests {
     #[test]
     fn angles_between_rotations_are_theirs() {
         let turned = DMat3::from_rotation_x(0.3) * DMat3::from_rotation_z(1.2);
+        let angle_deg = |a: &DMat3, b: &DMat3| angle(a, b).to_degrees();
         assert!(angle_deg(&turned, &turned) < 1e-6);
         let more = turned * DMat3::from_rotation_y(0.01);
         assert!((angle_deg(&turned, &more) - 0.01_f64.to_degrees()).abs() < 1e-9);

@@ -36,7 +36,14 @@ const NARROW_BESIDE_FACTS: f32 = 760.0;
 const LOW: f32 = 330.0;
 
 /// Draws a card over a view, moved down by `down` points.
-fn card(ui: &Ui, rect: Rect, name: &'static str, align: Align2, down: f32, add: impl FnOnce(&mut Ui)) {
+fn card(
+    ui: &Ui,
+    rect: Rect,
+    name: impl std::hash::Hash + std::fmt::Debug,
+    align: Align2,
+    down: f32,
+    add: impl FnOnce(&mut Ui),
+) {
     let at = align.pos_in_rect(&rect.shrink(12.0)) + vec2(0.0, down);
     let area = Area::new(Id::unique(name)).order(Order::Middle).pivot(align).fixed_pos(at).constrain_to(rect);
     theme::card(ui.ctx(), area, |ui| ui.horizontal(|ui| add(ui)));
@@ -46,10 +53,6 @@ fn card(ui: &Ui, rect: Rect, name: &'static str, align: Align2, down: f32, add: 
 const NARROW_BESIDE_MODES: f32 = 640.0;
 /// Space of a letter of that name, points.
 const LETTER_PT: f32 = 7.8;
-
-/// Names of the cards of the views of other scenes.
-const NAMES: [&str; 3] = ["beside", "beside 2", "beside 3"];
-const FIGURES: [&str; 3] = ["figures beside", "figures beside 2", "figures beside 3"];
 
 /// Content of the cards over a view.
 pub(super) struct ViewCards<'a> {
@@ -69,7 +72,7 @@ pub(super) struct ViewCards<'a> {
 
 impl ViewCards<'_> {
     /// Draws the cards over the active view.
-    pub(super) fn show(&mut self, ui: &Ui, area: ViewArea, figures: Option<AnswerFigures>, cx: &mut Ctx<'_>) {
+    pub(super) fn show(&mut self, ui: &Ui, area: ViewArea, figures: Option<AnswerFigures<'_>>, cx: &mut Ctx<'_>) {
         let (state, ViewArea { rect, second, index, is_other, .. }) = (cx.state, area);
         if index > 1 {
             // The modes stand in the second view, for all beside the first.
@@ -168,7 +171,7 @@ impl ViewCards<'_> {
     }
 
     /// Draws the cards of another scene: its name, and what it answers.
-    fn beside(&self, ui: &Ui, area: ViewArea, figures: Option<AnswerFigures>, cx: &mut Ctx<'_>) {
+    fn beside(&self, ui: &Ui, area: ViewArea, figures: Option<AnswerFigures<'_>>, cx: &mut Ctx<'_>) {
         let Some((k, other)) = area.index.checked_sub(1).and_then(|k| Some((k, cx.state.beside.get(k)?))) else {
             return;
         };
@@ -180,11 +183,11 @@ impl ViewCards<'_> {
             (0, false) => (Align2::LEFT_TOP, 46.0),
             _ => (Align2::LEFT_TOP, 0.0),
         };
-        card(ui, rect, NAMES[k % NAMES.len()], align, down, |ui| {
+        card(ui, rect, ("beside", k), align, down, |ui| {
             self.name_of_other(ui, k, other, rect.width(), cx);
         });
         if let Some(figures) = figures {
-            card(ui, rect, FIGURES[k % FIGURES.len()], Align2::RIGHT_BOTTOM, 0.0, |ui| figures.show(ui));
+            card(ui, rect, ("figures beside", k), Align2::RIGHT_BOTTOM, 0.0, |ui| figures.show(ui));
         }
     }
 

@@ -2,13 +2,15 @@
 //! rule or by one rule for all. A result that knows embeddings but no objects is asked this way alone, too.
 
 mod bar;
+mod figures;
 mod painted;
 
 use std::sync::Arc;
 
-use egui::{Color32, Label, Pos2, RichText, Stroke, Ui};
+use egui::{Color32, Pos2, Stroke, Ui};
 use glam::DVec3;
 
+pub(super) use self::figures::AnswerFigures;
 use self::painted::PaintedAnswer;
 use super::split::ViewArea;
 use crate::jobs::compare::answer::PhraseAnswer;
@@ -17,7 +19,7 @@ use crate::jobs::compare::subject::AskableScene;
 use crate::math::colormap::Colormap;
 use crate::pipeline::semantics::query::foreign::own_rules::ForeignMask;
 use crate::pipeline::semantics::query::foreign::pointed::PointedPixel;
-use crate::scene::{Camera, Mask, text};
+use crate::scene::Camera;
 use crate::ui::state::AppState;
 use crate::ui::theme;
 use crate::worker::Versioned;
@@ -26,8 +28,6 @@ use crate::worker::view::ViewPicture;
 
 /// Longer side of the views that are asked, px.
 const SIDE_PX: u32 = 800;
-/// Width of a card with figures at most, points.
-const MOST_PT: f32 = 300.0;
 
 /// Choices of what the views show.
 #[derive(Clone, Debug, PartialEq)]
@@ -271,81 +271,12 @@ impl Compared {
         let painter = ui.painter_at(area.rect);
         painter.circle(at, 5.0, theme::accent(), Stroke::new(2.0, Color32::WHITE));
     }
-
-    /// Figures of the answer in a view: a short line, and all of it; or why there is none.
-    pub(super) fn figures(&self, index: usize, name: &str, truth: Option<&Mask>) -> Option<AnswerFigures> {
-        if !self.is_on || !self.asks() {
-            return None;
-        }
-        if self.waits(index) {
-            return Some(AnswerFigures { text: "asking\u{2026}".into(), more: String::new(), is_problem: false });
-        }
-        match self.answer(index).map(|answer| &**answer) {
-            None => {
-                let more = "It has neither objects nor embeddings.".to_owned();
-                Some(AnswerFigures { text: "cannot be asked".into(), more, is_problem: true })
-            }
-            Some(Err(why)) => Some(AnswerFigures { text: why.clone(), more: String::new(), is_problem: true }),
-            Some(Ok(answer)) => {
-                let figures = self.figures_of(answer, truth);
-                // The first view has no card with its name.
-                let is_first = index == 0 && self.scenes.len() > 1;
-                let text =
-                    if is_first { format!("{} \u{b7} {}", text::elided(name, 30), figures.text) } else { figures.text };
-                Some(AnswerFigures { text, ..figures })
-            }
-        }
-    }
-
-    fn figures_of(&self, answer: &PhraseAnswer, truth: Option<&Mask>) -> AnswerFigures {
-        let found = self.choices.mask(answer);
-        let (w, h) = (found.mask.width_px(), found.mask.height_px());
-        let share = 100.0 * found.mask.area() as f64 / (w * h).max(1) as f64;
-        let score = |mask: &Mask| truth.map(|truth| mask.iou(&truth.resized(w, h)));
-        let iou = score(&found.mask).map(|iou| format!(" \u{b7} IoU {iou:.3}")).unwrap_or_default();
-        let ms = answer.ms;
-        let text = format!("{share:.1} %{iou} \u{b7} {:.0} ms", ms.encode + ms.blend + ms.decode);
-        let rule = |what: &str, found: &ForeignMask| {
-            let iou = score(&found.mask).map(|iou| format!(", IoU {iou:.3}")).unwrap_or_default();
-            format!("{what} ({}): {} px, level {}{iou}", found.rule, found.mask.area(), found.level + 1)
-        };
-        let mut more = vec![format!("Mask covers {share:.2} % of the view.")];
-        more.extend(answer.own.as_ref().map(|own| rule("Own rule", own)));
-        more.push(rule("Common rule", &answer.common));
-        let most = answer.raw.iter().copied().fold(0.0, f32::max);
-        more.push(format!("Largest relevancy {most:.3}"));
-        more.push(format!(
-            "Encoding {:.1} ms, rendering {:.1} ms once a view, relevancy {:.1} ms",
-            ms.encode, ms.blend, ms.decode
-        ));
-        AnswerFigures { text, more: more.join("\n"), is_problem: false }
-    }
 }
 
 /// Least and largest of what is larger than 0.
 fn range_of<'a>(values: impl Iterator<Item = &'a f32>) -> [f32; 2] {
     let shown = values.copied().filter(|v| *v > 0.0);
     shown.fold([f32::INFINITY, 0.0_f32], |[least, most], v| [least.min(v), most.max(v)])
-}
-
-/// Figures of an answer.
-pub(super) struct AnswerFigures {
-    pub(super) text: String,
-    /// All figures, a line each.
-    pub(super) more: String,
-    pub(super) is_problem: bool,
-}
-
-impl AnswerFigures {
-    pub(super) fn show(&self, ui: &mut Ui) {
-        let color = if self.is_problem { theme::warning() } else { theme::text() };
-        // Of a long reason all is shown, in lines.
-        ui.set_max_width(MOST_PT);
-        let label = ui.add(Label::new(RichText::new(&self.text).small().color(color)).wrap());
-        if !self.more.is_empty() {
-            label.on_hover_text(&self.more);
-        }
-    }
 }
 
 /// Colors of relevancy in all views.
