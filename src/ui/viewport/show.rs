@@ -37,8 +37,14 @@ impl Viewport {
         let Some(scene) = &state.scene else { return };
         self.compared.follow(state, cx.layout.split_view);
         if self.compared.is_on() {
-            let frame = Frame::new().fill(theme::panel()).inner_margin(Margin::symmetric(10, 6));
-            Panel::top("compared").frame(frame).show(ui, |ui| self.compared.bar(ui, cx));
+            let ctx = ui.ctx().clone();
+            theme::in_window_theme(&ctx, || {
+                let frame = Frame::new().fill(theme::panel()).inner_margin(Margin::symmetric(10, 6));
+                Panel::top("compared").frame(frame).show(ui, |ui| {
+                    ui.set_style(ctx.style_of(ctx.theme()));
+                    self.compared.bar(ui, cx);
+                });
+            });
         }
         let whole = ui.available_rect_before_wrap();
         let response = ui.allocate_rect(whole, Sense::click_and_drag());
@@ -77,6 +83,10 @@ impl Viewport {
             self.queries.ask_from(place, semantics);
         }
         let areas: Vec<ViewArea> = views.areas(shown, has_other).collect();
+        if areas.len() == 3 {
+            // In two rows of two, a place is empty.
+            ui.painter().rect_filled(whole, 0.0, theme::canvas());
+        }
         let is_second = self.queries.is_second();
         let with_cameras = cx.layout.cameras && self.has_nothing_to_look_at() && !route.is_some_and(|r| r.plays);
         self.compared.keep_up(ui.ctx(), self.display.picture());

@@ -12,8 +12,9 @@ use crate::ui::paired::paired;
 use crate::ui::text_field::take_keyboard;
 use crate::ui::theme;
 
-/// Width of the field, points.
+/// Width of the field, and of the buttons beside it, points.
 const FIELD_PT: f32 = 260.0;
+const BUTTONS_PT: f32 = 240.0;
 
 /// Scales with their names and what they show.
 const SCALES: [(ShownRelevancy, &str, &str); 3] = [
@@ -59,7 +60,7 @@ impl Compared {
             1 => "A phrase ( / ), or click a thing".to_owned(),
             _ => format!("A phrase for all {scenes} ( / ), or click a thing"),
         };
-        let width = FIELD_PT.min(ui.available_width());
+        let width = FIELD_PT.min((ui.available_width() - BUTTONS_PT).max(0.5 * FIELD_PT));
         let edit = TextEdit::singleline(&mut self.typed).id(id).hint_text(hint).char_limit(2_000).desired_width(width);
         let response = ui.add(edit).accessible_name("Phrase");
         if response.changed() {
