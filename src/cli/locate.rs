@@ -8,7 +8,7 @@ use super::progress::Console;
 use super::scene_args::open_scene;
 use super::{CliError, number, output};
 use crate::jobs::Scene;
-use crate::jobs::locate::check::{self, CheckSummary, CheckedPicture, LocateCheck, LocateCheckOptions};
+use crate::jobs::locate::check::{self, CheckSummary, CheckedChange, CheckedPicture, LocateCheck, LocateCheckOptions};
 use crate::jobs::locate::{self, DEFAULT_PX, LocateOptions, LocatedPhoto, MOST_PX, write};
 use crate::math::format;
 
@@ -51,6 +51,9 @@ pub(crate) struct LocateArgs {
     /// Hide the focal lengths of the measured photos, too
     #[arg(long)]
     unknown_focal: bool,
+    /// Locate changed copies, too: brighter, darker, in warmer light, blurred, partly hidden, and zoomed
+    #[arg(long)]
+    check_changes: bool,
     /// Print one JSON document
     #[arg(long)]
     json: bool,
@@ -128,7 +131,11 @@ fn line(found: &LocatedPhoto, radius: f64) -> String {
 
 /// Locates held-out photos and pictures of other things.
 fn measure(args: &LocateArgs, scene: &Scene, mut console: Console) -> Result<(), CliError> {
-    let wanted = LocateCheckOptions { others: args.check_others.clone(), unknown_focal: args.unknown_focal };
+    let wanted = LocateCheckOptions {
+        others: args.check_others.clone(),
+        unknown_focal: args.unknown_focal,
+        changes: args.check_changes,
+    };
     let found = check::run(scene, &args.options(), &wanted, &mut console).map_err(CliError::of_views)?;
     drop(console);
     if args.json { output::print_json(&found) } else { output::print(&report(&found)) }
@@ -165,6 +172,18 @@ fn report(found: &LocateCheck) -> String {
         secs[1],
         found.prepare_secs
     );
+    if !found.changes.is_empty() {
+        let head = ["change", "accepted", "wrongly", "within 2 %, 1\u{b0}", "median %", "degrees", "s"];
+        let mut rows = vec![head.map(str::to_owned).to_vec()];
+        rows.extend(found.changes.iter().map(|CheckedChange { change, summary: s, .. }| {
+            let of_all = |n: usize| format!("{n} of {}", s.photos);
+            let [center, turn, secs] =
+                [100.0 * s.center_error[0], s.rotation_error_deg[0], s.secs[0]].map(|v| format!("{v:.3}"));
+            let wrongly = s.accepted_wrongly.to_string();
+            vec![(*change).to_owned(), of_all(s.accepted), wrongly, of_all(s.within_bounds[1]), center, turn, secs]
+        }));
+        text += &format!("\n\n{}", output::table(&rows));
+    }
     let CheckSummary { others, others_accepted, noises, noises_accepted, .. } = found.summary;
     text += &format!("\naccepted of noise: {noises_accepted} of {noises}");
     if others > 0 {

@@ -153,6 +153,10 @@ fn asked(name: &str, of: AskedResult, observer: &mut dyn Observer) -> Result<Vec
     let scene = ForeignScene::new(Arc::new(result));
     let timed = asking::time(name, &scene, &cameras, &phrases, &mut || observer.proceed().is_ok())?;
     observer.proceed()?;
+    // The next result may take minutes.
+    if let Some(phrase) = timed.iter().find(|sample| sample.stage == "phrase") {
+        observer.note(Severity::Info, format!("A phrase takes {:.1} ms of {name} ({} asked)", phrase.median, phrase.n));
+    }
     Ok(timed)
 }
 

@@ -160,7 +160,9 @@ pub(super) const RULES: &[Rule] = &[
     rule(&["remove"], &["paint", "seed"], |g| when(g.is("fill", "none"), "with --fill none")),
     rule(&["remove"], &["seed"], |g| when(!g.is("paint", "patches"), "here: only --paint patches chooses at random")),
     // Poses of photos.
-    rule(&["locate"], &["check_others", "unknown_focal"], |g| when(!g.has("check"), "without --check")),
+    rule(&["locate"], &["check_others", "unknown_focal", "check_changes"], |g| {
+        when(!g.has("check"), "without --check")
+    }),
     rule(&["locate"], &["focal_px", "out"], |g| when(g.has("check"), "with --check, which locates held-out photos")),
     // Pictures and flights.
     rule(&["render"], &["quality", "fps", "mark", "ffmpeg"], |g| when(!g.has("path"), "without --path")),

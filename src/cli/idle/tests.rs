@@ -254,8 +254,8 @@ const LINES: &[(&str, &[&str], &str)] = &[
     ),
     (
         "locate s a.jpg {}",
-        &["--check-others o", "--unknown-focal"],
-        "locate s --check --check-others o --unknown-focal",
+        &["--check-others o", "--unknown-focal", "--check-changes"],
+        "locate s --check --check-others o --unknown-focal --check-changes",
     ),
     ("locate s --check {}", &["--focal-px 9", "--out t.json"], "locate s a.jpg --focal-px 9 --out t.json"),
     ("export s --html p.html {}", &["--no-measure"], "export s --html p.html --out a.ply --no-measure"),

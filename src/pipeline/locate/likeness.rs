@@ -23,6 +23,13 @@ pub(super) struct Likeness {
     pub(super) correlation: f64,
 }
 
+impl Likeness {
+    /// By which poses are compared.
+    pub(super) fn sum(&self) -> f64 {
+        self.explained + self.correlation
+    }
+}
+
 /// Compares a rendering with a photo of its size; pixels of coverage 0 do not count.
 pub(super) fn likeness(rendered: &GrayPlane, photo: &GrayPlane, coverage: &[f32]) -> Likeness {
     let longer = photo.width.max(photo.height);

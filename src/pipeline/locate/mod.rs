@@ -77,6 +77,8 @@ const EXPLAINED: f64 = 0.35;
 const CORRELATION: f64 = 0.3;
 /// Least share of blocks without such support: luck does not reach it.
 const EXPLAINED_ALONE: f64 = 0.6;
+/// Share of the blocks of the smallest picture below which nothing larger is aligned without such support.
+const HOPEFUL: f64 = 0.25;
 /// Pixels whose errors are alike, by which errors of a pose are larger than independent pixels had it.
 const CORRELATED_PX: f64 = 25.0;
 
@@ -181,12 +183,13 @@ impl Locator {
         let focals = if focal == FocalKnowledge::Unknown { &FOCALS[..] } else { &FOCALS[..1] };
         let (found, agreeing) = self.by_matches(&seen, &alike, lens, focals, within_px, observer)?;
         let mut starts: Vec<Camera> = found.map(|f| f.camera).into_iter().collect();
-        if agreeing < SUPPORTED {
+        let is_supported = agreeing >= SUPPORTED;
+        if !is_supported {
             starts.extend(alike.into_iter().take(WITHOUT_MATCHES).map(|view| view.pose));
         }
-        let (aligned, level) = self.aligned(photo, lens, starts, focal, observer)?;
+        let (aligned, level) = self.aligned(photo, lens, starts, focal, is_supported, observer)?;
         let Likeness { explained, correlation } = compare(&aligned, &level);
-        let accepted = match agreeing >= SUPPORTED {
+        let accepted = match is_supported {
             true => explained >= EXPLAINED && correlation >= CORRELATION,
             false => explained >= EXPLAINED_ALONE,
         };
@@ -248,6 +251,7 @@ impl Locator {
         lens: &Camera,
         starts: Vec<Camera>,
         focal: FocalKnowledge,
+        is_supported: bool,
         observer: &dyn Observer,
     ) -> Result<(Aligned, PhotoLevel), LocateError> {
         let most = match focal {
@@ -261,7 +265,7 @@ impl Locator {
         for px in sizes {
             let size = lens.limited_to(px);
             let level = PhotoLevel::of(photo, size.width_px as usize, size.height_px as usize);
-            let mut best: Option<(f64, Aligned)> = None;
+            let mut best: Option<(Likeness, Aligned)> = None;
             for start in &starts {
                 observer.proceed()?;
                 let start = start.resized(size.width_px, size.height_px);
@@ -269,14 +273,17 @@ impl Locator {
                 let bounds: FocalBounds = most.map(|most| [-most - changed, most - changed]);
                 let steps = if px == self.finest_px { FINEST_STEPS } else { STEPS };
                 let aligned = align(&mut self.gallery, &level, &start, bounds, steps)?;
-                let Likeness { explained, correlation } = compare(&aligned, &level);
-                if best.as_ref().is_none_or(|(most, _)| explained + correlation > *most) {
-                    best = Some((explained + correlation, aligned));
+                let alike = compare(&aligned, &level);
+                if best.as_ref().is_none_or(|(most, _)| alike.sum() > most.sum()) {
+                    best = Some((alike, aligned));
                 }
             }
-            let Some((_, aligned)) = best else { return Err(LocateError::NoCameras) };
+            let Some((alike, aligned)) = best else { return Err(LocateError::NoCameras) };
             starts = vec![aligned.camera.clone()];
             last = Some((aligned, level));
+            if !is_supported && alike.explained < HOPEFUL {
+                break;
+            }
         }
         last.ok_or(LocateError::NoCameras)
     }

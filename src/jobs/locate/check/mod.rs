@@ -1,18 +1,20 @@
 //! Measures how well photos are located: held-out photos of a scene, whose poses are hidden, and photos of other things.
 
+mod changes;
+
 use std::path::PathBuf;
 use std::time::Instant;
 
 use glam::{DMat3, DVec2, DVec3};
-use rand::{RngExt, SeedableRng};
+use rand::SeedableRng;
 use serde::Serialize;
 
+use self::changes::{PhotoChange, noise};
 use super::{LocateJob, LocateOptions};
 use crate::io;
 use crate::io::IoError;
 use crate::jobs::held_out::held_out;
 use crate::jobs::{JobError, Scene, open};
-use crate::math::resize::{Filter, resize};
 use crate::math::stats::{median, quantile};
 use crate::navigate::pose::angle;
 use crate::pipeline::locate::{FocalKnowledge, FoundPlace, LocateError, PHOTO_PX};
@@ -35,6 +37,8 @@ pub(crate) struct LocateCheckOptions {
     pub(crate) others: Option<PathBuf>,
     /// True to hide the focal lengths, too.
     pub(crate) unknown_focal: bool,
+    /// True to locate changed copies of the held-out photos, too.
+    pub(crate) changes: bool,
 }
 
 /// A picture that was located, without its pose.
@@ -82,10 +86,19 @@ pub(crate) struct CheckSummary {
     pub(crate) noises_accepted: usize,
 }
 
+/// Copies of the held-out photos with one change.
+#[derive(Clone, Debug, Serialize)]
+pub(crate) struct CheckedChange {
+    pub(crate) change: &'static str,
+    pub(crate) photos: Vec<CheckedPhoto>,
+    pub(crate) summary: CheckSummary,
+}
+
 /// Result of the measurement.
 #[derive(Clone, Debug, Serialize)]
 pub(crate) struct LocateCheck {
     pub(crate) photos: Vec<CheckedPhoto>,
+    pub(crate) changes: Vec<CheckedChange>,
     /// Pictures that do not show the scene.
     pub(crate) others: Vec<CheckedPicture>,
     pub(crate) noises: Vec<CheckedPicture>,
@@ -102,6 +115,7 @@ impl LocateJob {
         &mut self,
         dataset: &Dataset,
         index: usize,
+        change: Option<PhotoChange>,
         unknown_focal: bool,
         observer: &dyn Observer,
     ) -> Result<Option<CheckedPhoto>, JobError> {
@@ -111,7 +125,12 @@ impl LocateJob {
             Err(IoError::NothingShown { .. }) => return Ok(None),
             pixels => pixels?,
         };
-        let truth = photo.camera.resized(pixels.width_px, pixels.height_px);
+        let mut truth = photo.camera.resized(pixels.width_px, pixels.height_px);
+        let mut pixels = pixels;
+        if let Some(change) = change {
+            (pixels, truth) = change.of(&pixels, &truth, index as u64);
+        }
+        let unknown_focal = unknown_focal || change.is_some_and(PhotoChange::hides_focal);
         let (picture, found) = self.located(photo.name.clone(), &pixels, &truth, unknown_focal, start, observer)?;
         let turn = angle(&found.camera.world_from_camera, &truth.world_from_camera);
         let deviations = found.deviations();
@@ -191,12 +210,25 @@ pub(crate) fn run(
     let mut job = LocateJob::new(scene, options, observer)?;
     let hide = check.unknown_focal;
 
-    let mut ticker = Ticker::new("Locating held-out photos", held.len());
+    let kinds: Vec<Option<PhotoChange>> =
+        std::iter::once(None).chain(PhotoChange::ALL.into_iter().filter(|_| check.changes).map(Some)).collect();
+    let mut ticker = Ticker::new("Locating held-out photos", kinds.len() * held.len());
     let mut checked = Vec::with_capacity(held.len());
-    for (done, &index) in held.iter().enumerate() {
-        ticker.proceed(observer)?;
-        checked.extend(job.check(&dataset, index, hide, observer)?);
-        ticker.report(done as u64 + 1, observer);
+    let mut changed = Vec::new();
+    for (kind, change) in kinds.into_iter().enumerate() {
+        let mut photos = Vec::with_capacity(held.len());
+        for (done, &index) in held.iter().enumerate() {
+            ticker.proceed(observer)?;
+            photos.extend(job.check(&dataset, index, change, hide, observer)?);
+            ticker.report((kind * held.len() + done) as u64 + 1, observer);
+        }
+        match change {
+            None => checked = photos,
+            Some(change) => {
+                let summary = summary(&photos, &[], &[]);
+                changed.push(CheckedChange { change: change.name(), photos, summary });
+            }
+        }
     }
 
     let camera = dataset.photos[first].camera.limited_to(PHOTO_PX);
@@ -205,7 +237,10 @@ pub(crate) fn run(
     for (kind, spot_px) in SPOTS_PX.into_iter().enumerate() {
         for k in 0..NOISES {
             ticker.tick(kind * NOISES + k, observer)?;
-            let pixels = noise(&camera, spot_px, (kind * NOISES + k) as u64);
+            let mut rng = rand_pcg::Pcg64Mcg::seed_from_u64((kind * NOISES + k) as u64);
+            let (width_px, height_px) = (camera.width_px, camera.height_px);
+            let rgb = noise((width_px as usize, height_px as usize), spot_px, &mut rng);
+            let pixels = PhotoPixels { width_px, height_px, rgb, coverage: None, alpha: None };
             let name = format!("noise of {spot_px} px, {k}");
             noises.extend(job.check_other(name, &pixels, &camera, hide, observer)?);
         }
@@ -224,17 +259,7 @@ pub(crate) fn run(
     }
     let summary = summary(&checked, &refused, &noises);
     let (radius, prepare_secs) = (job.radius, job.prepare_secs);
-    Ok(LocateCheck { photos: checked, others: refused, noises, summary, radius, prepare_secs })
-}
-
-/// A picture of noise with spots of about this size.
-fn noise(camera: &Camera, spot_px: usize, seed: u64) -> PhotoPixels {
-    let mut rng = rand_pcg::Pcg64Mcg::seed_from_u64(seed);
-    let size = (camera.width_px as usize, camera.height_px as usize);
-    let small = (size.0.div_ceil(spot_px).max(2), size.1.div_ceil(spot_px).max(2));
-    let spots: Vec<[u8; 3]> = (0..small.0 * small.1).map(|_| rng.random()).collect();
-    let rgb = resize(&spots, small, size, Filter::Bicubic);
-    PhotoPixels { width_px: camera.width_px, height_px: camera.height_px, rgb, coverage: None, alpha: None }
+    Ok(LocateCheck { photos: checked, changes: changed, others: refused, noises, summary, radius, prepare_secs })
 }
 
 fn summary(photos: &[CheckedPhoto], others: &[CheckedPicture], noises: &[CheckedPicture]) -> CheckSummary {
@@ -292,14 +317,5 @@ mod tests {
         assert!(angle_deg(&turned, &turned) < 1e-6);
         let more = turned * DMat3::from_rotation_y(0.01);
         assert!((angle_deg(&turned, &more) - 0.01_f64.to_degrees()).abs() < 1e-9);
-    }
-
-    #[test]
-    fn noise_has_the_cameras_size() {
-        let camera = Camera::look_at(DVec3::ONE, DVec3::ZERO, DVec3::Z, 0.8, 64, 48).expect("valid");
-        for spot_px in SPOTS_PX {
-            assert_eq!(noise(&camera, spot_px, 1).len(), 64 * 48);
-        }
-        assert_ne!(noise(&camera, 8, 1), noise(&camera, 8, 2));
     }
 }
