@@ -160,6 +160,15 @@ pub(super) const RULES: &[Rule] = &[
     rule(&["remove"], &["paint", "seed"], |g| when(g.is("fill", "none"), "with --fill none")),
     rule(&["remove"], &["seed"], |g| when(!g.is("paint", "patches"), "here: only --paint patches chooses at random")),
     // Poses of photos.
+    rule(&["poses"], &["out", "maker", "frames", "install", "compare", "json"], |g| {
+        when(g.has("by_hand"), "with --by-hand, which finds nothing")
+    }),
+    rule(&["poses"], &["install"], |g| {
+        when(
+            g.is("maker", "colmap") || g.is("maker", "built-in"),
+            "with this --maker: it is pycolmap that is installed",
+        )
+    }),
     rule(&["locate"], &["check_others", "unknown_focal"], |g| when(!g.has("check"), "without --check")),
     rule(&["locate"], &["focal_px", "out"], |g| when(g.has("check"), "with --check, which locates held-out photos")),
     // Pictures and flights.

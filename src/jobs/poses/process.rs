@@ -4,13 +4,12 @@
 
 use std::collections::VecDeque;
 use std::io::{BufRead, BufReader, Read};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::time::Duration;
 
 use crossbeam_channel::{RecvTimeoutError, Sender, bounded};
 
-use super::PoseStage;
 use crate::jobs::JobError;
 use crate::pipeline::observer::{Observer, Ticker};
 
@@ -20,6 +19,15 @@ const LAST_LINES: usize = 8;
 const LINE_BYTES: u64 = 2_000;
 /// Time between checks of the observer while the program prints nothing.
 const PATIENCE: Duration = Duration::from_millis(100);
+
+/// A command to run.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) struct PoseStage {
+    /// Its task, for display.
+    pub(super) title: &'static str,
+    pub(super) program: PathBuf,
+    pub(super) args: Vec<String>,
+}
 
 /// A running program, killed when this is dropped.
 struct Running(Child);
