@@ -100,7 +100,7 @@ mod tests {
         [&short(DIRECTORY)[..], &short(4), &long(1), &long(directory)].iter().for_each(|b| out.extend(*b));
         out.extend(long(0));
         out.extend(short(tags.len() as u16));
-        let behind = directory + 2 + 12 * tags.len() as u32;
+        let behind = directory + 2 + 12 * tags.len() as u32 + 4;
         for (i, (tag, kind, value)) in tags.iter().enumerate() {
             [short(*tag), short(*kind)].iter().for_each(|b| out.extend(b));
             out.extend(long(1));
@@ -110,6 +110,7 @@ mod tests {
                 _ => out.extend(long(behind + 8 * i as u32)),
             }
         }
+        out.extend(long(0));
         tags.iter().for_each(|(.., value)| value.iter().for_each(|v| out.extend(long(*v))));
         out
     }
