@@ -10,7 +10,7 @@ use crate::io::{IoError, files};
 
 /// Points that a photo's pose rests on.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub(crate) struct PhotoSupport {
+pub(crate) struct PhotoPoints {
     /// Number of points.
     pub(crate) points: usize,
     /// Mean reprojection error of these points, px; `None` if it is not known.
@@ -18,13 +18,13 @@ pub(crate) struct PhotoSupport {
 }
 
 /// Reads the support of each photo by name; empty for a reconstruction in text.
-pub(crate) fn read(model: &Path) -> Result<HashMap<String, PhotoSupport>, IoError> {
+pub(crate) fn read(model: &Path) -> Result<HashMap<String, PhotoPoints>, IoError> {
     let Some(model) = ModelFolder::at(model, 0).filter(|model| model.is_binary) else { return Ok(HashMap::new()) };
     let path = model.file("points3D");
     let sums = sums(&files::read(&path, u64::MAX)?, &path)?;
     let of = |number: u32| {
         let (points, known, error) = sums.get(&number).copied().unwrap_or_default();
-        PhotoSupport { points, error_px: (known > 0).then(|| error / known as f64) }
+        PhotoPoints { points, error_px: (known > 0).then(|| error / known as f64) }
     };
     Ok(model.images()?.into_iter().map(|image| (image.name, of(image.number))).collect())
 }

@@ -17,8 +17,8 @@ use openmvg::sfm::{
     Camera, Dataset, ExtractionMethod, Frontend, Incremental, IntrinsicId, SfmError, SfmOutput, ViewGraph, checkpoint,
 };
 
-use super::makers::{MakerKind, PoseMaker};
-use super::{ENOUGH, IMAGES, PoseStep, PoseWork};
+use super::maker::{MakerKind, PoseMaker};
+use super::{ENOUGH, IMAGES, MakerStep, PoseWork};
 use crate::io::exif::{self, ExifFocal};
 use crate::io::photo;
 use crate::jobs::JobError;
@@ -46,26 +46,26 @@ impl PoseMaker for BuiltIn {
         "the built-in maker (OpenMVG)".into()
     }
 
-    fn steps(&self) -> &'static [PoseStep] {
-        &[PoseStep::Matches, PoseStep::Mapping]
+    fn steps(&self) -> &'static [MakerStep] {
+        &[MakerStep::Matches, MakerStep::Mapping]
     }
 
     fn keeps(&self) -> &'static str {
         GRAPH
     }
 
-    fn run(&self, step: PoseStep, work: &PoseWork<'_>, observer: &mut dyn Observer) -> Result<(), JobError> {
+    fn run(&self, step: MakerStep, work: &PoseWork<'_>, observer: &mut dyn Observer) -> Result<(), JobError> {
         let graph = work.at(GRAPH);
         match step {
-            PoseStep::Features => Ok(()),
-            PoseStep::Matches => {
+            MakerStep::Features => Ok(()),
+            MakerStep::Matches => {
                 let photos = Photos::read(work)?;
                 let start =
                     photos.stated_sides().map_or((GUESS, IntrinsicPrior::Guess), |s| (s, IntrinsicPrior::Trusted));
                 let found = photos.graph(start, observer)?;
                 checkpoint::write_view_graph(&found, &graph).map_err(|e| failed(&e))
             }
-            PoseStep::Mapping => {
+            MakerStep::Mapping => {
                 let found = checkpoint::read_view_graph(&graph).map_err(|e| failed(&e))?;
                 let output = best(map(found, observer), work, observer)?;
                 model::write(output.reconstruction(), &work.at(IMAGES), &work.sparse.join("0"))

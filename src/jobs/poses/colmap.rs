@@ -2,9 +2,9 @@
 
 use std::path::{Path, PathBuf};
 
-use super::makers::{MakerKind, Places, PoseMaker};
+use super::maker::{MakerKind, MakerPlaces, PoseMaker};
 use super::process::{self, PoseStage};
-use super::{DATABASE, ENOUGH, IMAGES, PoseStep, PoseWork, SPARSE, findings::registered};
+use super::{DATABASE, ENOUGH, IMAGES, MakerStep, PoseWork, SPARSE, findings::registered};
 use crate::jobs::{JobError, export};
 use crate::pipeline::observer::Observer;
 
@@ -37,17 +37,17 @@ impl Gpu {
 
 impl Colmap {
     /// Finds it; GLOMAP needs its matches, so `None` without it.
-    pub(super) fn at(places: &Places) -> Option<Self> {
+    pub(super) fn at(places: &MakerPlaces) -> Option<Self> {
         Some(Self { colmap: places.program("colmap")?, glomap: places.program("glomap") })
     }
 
-    fn stage(&self, step: PoseStep, args: Vec<String>) -> PoseStage {
+    fn stage(&self, step: MakerStep, args: Vec<String>) -> PoseStage {
         PoseStage { title: step.title(), program: self.colmap.clone(), args }
     }
 
     /// Command that finds features, or matches them.
-    pub(super) fn features(&self, step: PoseStep, work: &PoseWork<'_>, gpu: &Gpu) -> PoseStage {
-        let is_extraction = step == PoseStep::Features;
+    pub(super) fn features(&self, step: MakerStep, work: &PoseWork<'_>, gpu: &Gpu) -> PoseStage {
+        let is_extraction = step == MakerStep::Features;
         let mut options = vec![("database_path", text(&work.at(DATABASE)))];
         if is_extraction {
             options.push(("image_path", text(&work.at(IMAGES))));
@@ -75,7 +75,7 @@ impl Colmap {
             ("image_path", text(&work.at(IMAGES))),
             ("output_path", text(sparse)),
         ];
-        let mut stage = self.stage(PoseStep::Mapping, args(command, &options));
+        let mut stage = self.stage(MakerStep::Mapping, args(command, &options));
         if let Some(glomap) = self.glomap.as_ref().filter(|_| with_glomap) {
             stage.program.clone_from(glomap);
         }
@@ -122,11 +122,11 @@ impl PoseMaker for Colmap {
         if self.glomap.is_some() { "COLMAP and GLOMAP" } else { "COLMAP" }.into()
     }
 
-    fn run(&self, step: PoseStep, work: &PoseWork<'_>, observer: &mut dyn Observer) -> Result<(), JobError> {
+    fn run(&self, step: MakerStep, work: &PoseWork<'_>, observer: &mut dyn Observer) -> Result<(), JobError> {
         let help = |args: &[&str]| process::output(&self.colmap, args);
         let general = help(&["help"]);
         match step {
-            PoseStep::Mapping => self.map(&general, work, observer),
+            MakerStep::Mapping => self.map(&general, work, observer),
             _ => {
                 let gpu = Gpu::of(&general, &help(&["feature_extractor", "-h"]));
                 process::run(&self.features(step, work, &gpu), work.photos.len(), observer)
@@ -142,8 +142,8 @@ pub(super) fn by_hand(out: &Path) -> Vec<Vec<String>> {
     let work = PoseWork { out, photos: &[], one_camera: false, is_video: false, sparse: sparse.clone() };
     let gpu = Gpu::AsItIs;
     let stages = [
-        tools.features(PoseStep::Features, &work, &gpu),
-        tools.features(PoseStep::Matches, &work, &gpu),
+        tools.features(MakerStep::Features, &work, &gpu),
+        tools.features(MakerStep::Matches, &work, &gpu),
         tools.mapping("mapper", false, &work, &sparse),
     ];
     stages.into_iter().map(|stage| std::iter::once("colmap".to_owned()).chain(stage.args).collect()).collect()

@@ -2,9 +2,9 @@
 
 use std::path::{Path, PathBuf};
 
-use super::makers::Places;
+use super::maker::MakerPlaces;
 use super::process::{self, PoseStage};
-use crate::jobs::{Folders, JobError, export};
+use crate::jobs::{JobError, export};
 use crate::pipeline::observer::Observer;
 
 /// Sentence to agree to before it is made.
@@ -14,11 +14,6 @@ pub(crate) const TERMS: &str = "downloads the Python package pycolmap (COLMAP; B
 const READY: &str = "ready";
 /// Requirement that pip is given.
 const PACKAGE: &str = "pycolmap>=3.11";
-
-/// Folder of the environment.
-pub(crate) fn folder(folders: &Folders) -> PathBuf {
-    folders.cache().join("pycolmap")
-}
 
 /// Python of an environment, if there is one.
 pub(super) fn python_of(environment: &Path) -> Option<PathBuf> {
@@ -35,7 +30,7 @@ pub(super) fn ready(environment: &Path) -> Option<PathBuf> {
 ///
 /// # Errors
 /// If there is no Python, pip fails, or the observer asks to stop.
-pub(crate) fn install(places: &Places, observer: &mut dyn Observer) -> Result<(), JobError> {
+pub(crate) fn install(places: &MakerPlaces, observer: &mut dyn Observer) -> Result<(), JobError> {
     let environment = &places.own_python;
     if ready(environment).is_some() {
         return Ok(());

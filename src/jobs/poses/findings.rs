@@ -68,7 +68,7 @@ pub(super) fn of(
     observer: &mut dyn Observer,
 ) -> Result<FoundPoses, JobError> {
     let dataset = colmap::read(out)?;
-    let support: HashMap<String, support::PhotoSupport> = support::read(&out.join(SPARSE).join("0"))?;
+    let support: HashMap<String, support::PhotoPoints> = support::read(&out.join(SPARSE).join("0"))?;
     let errors: Vec<f64> = support.values().filter_map(|s| s.error_px).collect();
     let (usual_error, usual_points) =
         (median(&errors), median(&support.values().map(|s| s.points as f64).collect::<Vec<_>>()));

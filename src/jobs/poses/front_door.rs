@@ -2,8 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
-use super::makers::{self, Places};
-use super::{FoundPoses, MakerKind, environment, find, source, usual_out};
+use super::maker::MakerPlaces;
+use super::{FoundPoses, MakerKind, environment, find, makers, source, usual_out};
 use crate::io::unposed::Unposed;
 use crate::jobs::{Folders, JobError};
 use crate::pipeline::observer::{Observer, Severity};
@@ -37,7 +37,7 @@ pub struct PoseQuestion {
 impl PoseQuestion {
     /// Looks for makers.
     pub(crate) fn of(photos: Unposed, folders: &Folders) -> Self {
-        let places = Places::usual(folders);
+        let places = MakerPlaces::usual(folders);
         let makers = makers::installed(&places).iter().map(|maker| (maker.kind(), maker.name())).collect();
         let has_python = ["python3", "python"].iter().any(|name| places.program(name).is_some());
         Self { photos, makers, installs_into: has_python.then_some(places.own_python) }
@@ -50,7 +50,7 @@ impl PoseQuestion {
 /// As [`find`], and if no maker is here.
 pub(crate) fn find_in(
     request: &PoseRequest,
-    places: &Places,
+    places: &MakerPlaces,
     folders: &Folders,
     observer: &mut dyn Observer,
 ) -> Result<FoundPoses, JobError> {
@@ -76,7 +76,7 @@ pub(crate) fn find_here(
     folders: &Folders,
     observer: &mut dyn Observer,
 ) -> Result<FoundPoses, JobError> {
-    find_in(request, &Places::usual(folders), folders, observer)
+    find_in(request, &MakerPlaces::usual(folders), folders, observer)
 }
 
 impl FoundPoses {

@@ -11,7 +11,8 @@ pub(crate) mod compare;
 pub(crate) mod environment;
 mod findings;
 pub(crate) mod front_door;
-pub(crate) mod makers;
+mod maker;
+mod makers;
 pub(crate) mod manual;
 mod process;
 mod pycolmap;
@@ -19,8 +20,6 @@ pub(crate) mod source;
 mod state;
 #[cfg(test)]
 mod tests;
-#[cfg(test)]
-mod tests_video;
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -32,7 +31,7 @@ use crate::io::unposed::Unposed;
 use crate::io::{self, exif, files, photo};
 use crate::pipeline::observer::{Observer, Severity};
 pub(crate) use findings::FoundPoses;
-pub(crate) use makers::{MakerKind, PoseMaker};
+pub(crate) use maker::{MakerKind, PoseMaker};
 use state::PoseState;
 
 /// Folder of the reconstructions in the folder of poses.
@@ -47,7 +46,7 @@ const ENOUGH: f64 = 0.8;
 /// Step on the way to camera poses; the result of each is kept.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "kebab-case")]
-pub(crate) enum PoseStep {
+pub(crate) enum MakerStep {
     /// Finds features in each photo.
     Features,
     /// Finds the same features in pairs of photos.
@@ -56,7 +55,7 @@ pub(crate) enum PoseStep {
     Mapping,
 }
 
-impl PoseStep {
+impl MakerStep {
     /// Its task, for display.
     fn title(self) -> &'static str {
         match self {
@@ -119,12 +118,12 @@ pub(crate) fn find(
         if state.done.contains(&step) {
             continue;
         }
-        if step == PoseStep::Mapping {
+        if step == MakerStep::Mapping {
             remove(&part)?;
             export::make_folder(&part)?;
         }
         maker.run(step, &work, observer)?;
-        if step == PoseStep::Mapping {
+        if step == MakerStep::Mapping {
             largest_first(&part)?;
             if !io::colmap::is_colmap(&part) {
                 return Err(JobError::NoPosesFound(photos.folder.clone()));

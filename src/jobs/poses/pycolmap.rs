@@ -2,9 +2,9 @@
 
 use std::path::PathBuf;
 
-use super::makers::{MakerKind, Places, PoseMaker};
+use super::maker::{MakerKind, MakerPlaces, PoseMaker};
 use super::process::{self, PoseStage};
-use super::{ENOUGH, PoseStep, PoseWork, environment};
+use super::{ENOUGH, MakerStep, PoseWork, environment};
 use crate::jobs::JobError;
 use crate::pipeline::observer::Observer;
 
@@ -23,7 +23,7 @@ pub(super) struct Pycolmap {
 
 impl Pycolmap {
     /// Asks the active Python, then the one of this program.
-    pub(super) fn at(places: &Places) -> Option<Self> {
+    pub(super) fn at(places: &MakerPlaces) -> Option<Self> {
         let active = places.python.iter().filter_map(|environment| environment::python_of(environment));
         let on_path = ["python3", "python"].iter().filter_map(|name| places.program(name)).take(1);
         let own = environment::ready(&places.own_python);
@@ -44,12 +44,12 @@ impl PoseMaker for Pycolmap {
         format!("pycolmap {}", self.version)
     }
 
-    fn run(&self, step: PoseStep, work: &PoseWork<'_>, observer: &mut dyn Observer) -> Result<(), JobError> {
+    fn run(&self, step: MakerStep, work: &PoseWork<'_>, observer: &mut dyn Observer) -> Result<(), JobError> {
         let flag = |is: bool| if is { "1" } else { "0" }.to_owned();
         let word = match step {
-            PoseStep::Features => "features",
-            PoseStep::Matches => "matches",
-            PoseStep::Mapping => "mapping",
+            MakerStep::Features => "features",
+            MakerStep::Matches => "matches",
+            MakerStep::Mapping => "mapping",
         };
         let path = |path: &std::path::Path| path.to_string_lossy().into_owned();
         let enough = (ENOUGH * work.photos.len() as f64).ceil() as usize;

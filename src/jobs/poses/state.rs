@@ -4,7 +4,7 @@ use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
-use super::{DATABASE, FoundPoses, IMAGES, MakerKind, PoseMaker, PoseStep, SPARSE, remove};
+use super::{DATABASE, FoundPoses, IMAGES, MakerKind, MakerStep, PoseMaker, SPARSE, remove};
 use crate::io::unposed::Unposed;
 use crate::io::{IoError, files};
 use crate::jobs::{JobError, export};
@@ -27,7 +27,7 @@ pub(super) struct PoseState {
     maker: MakerKind,
     photos: Vec<KnownPhoto>,
     /// Finished steps.
-    pub(super) done: Vec<PoseStep>,
+    pub(super) done: Vec<MakerStep>,
     /// Result, once all steps are done.
     pub(super) found: Option<FoundPoses>,
 }
@@ -43,8 +43,8 @@ impl PoseState {
         let listed = known(photos)?;
         let earlier: Option<Self> = files::read_json(&out.join(FILE)).ok();
         if let Some(earlier) = earlier.filter(|e| e.maker == maker.kind() && e.photos == listed) {
-            let is_there = |step: &PoseStep| match step {
-                PoseStep::Mapping => out.join(SPARSE).join("0").is_dir(),
+            let is_there = |step: &MakerStep| match step {
+                MakerStep::Mapping => out.join(SPARSE).join("0").is_dir(),
                 _ => out.join(maker.keeps()).is_file(),
             };
             if earlier.done.iter().all(is_there) {
@@ -60,7 +60,7 @@ impl PoseState {
     }
 
     /// Notes that a step is finished.
-    pub(super) fn finish(&mut self, step: PoseStep, out: &Path) -> Result<(), JobError> {
+    pub(super) fn finish(&mut self, step: MakerStep, out: &Path) -> Result<(), JobError> {
         self.done.push(step);
         self.write(out)
     }

@@ -2,10 +2,13 @@
 
 #![cfg(unix)]
 
+mod video;
+
 use std::os::unix::fs::PermissionsExt;
 
 use super::front_door::{PoseRequest, find_in};
-use super::makers::{Places, choose};
+use super::maker::MakerPlaces;
+use super::makers::choose;
 use super::process::progress;
 use super::*;
 use crate::io::OpenError;
@@ -67,7 +70,7 @@ impl Fake {
     fn find(&self, observer: &mut dyn Observer) -> Result<PathBuf, JobError> {
         let here = self.guard.path();
         let request = PoseRequest { photos: self.photos.clone(), ..PoseRequest::default() };
-        let places = Places { path: here.into(), ..Places::default() };
+        let places = MakerPlaces { path: here.into(), ..MakerPlaces::default() };
         Ok(find_in(&request, &places, &Folders { data: here.join("data") }, observer)?.out)
     }
 
@@ -158,7 +161,7 @@ fn the_commands_can_be_copied_into_a_shell() {
         lines[3],
         "colmap mapper --database_path /data/fox/database.db --image_path /data/fox/images --output_path /data/fox/sparse"
     );
-    let nowhere = Places { path: "/no/such/place".into(), ..Places::default() };
+    let nowhere = MakerPlaces { path: "/no/such/place".into(), ..MakerPlaces::default() };
     let missing = choose(Some(MakerKind::Colmap), &nowhere).err().map(|e| e.to_string()).unwrap_or_default();
     assert!(missing.contains("'colmap' is not found on the PATH"), "{missing}");
 }
@@ -212,7 +215,7 @@ fn lost_photos_are_told_with_the_reason_and_a_strangers_folder_is_left_alone() {
     let Err(OpenError::NoPoses(photos)) = crate::io::open(&fake.photos.images) else { panic!("no poses") };
     let out = fake.guard.path().join("out");
     let request = PoseRequest { photos: *photos, out: Some(out.clone()), ..PoseRequest::default() };
-    let places = Places { path: fake.guard.path().into(), ..Places::default() };
+    let places = MakerPlaces { path: fake.guard.path().into(), ..MakerPlaces::default() };
     let folders = Folders { data: fake.guard.path().join("data") };
     let find = |request: &PoseRequest| find_in(request, &places, &folders, &mut Silent);
     let found = find(&request).expect("found");

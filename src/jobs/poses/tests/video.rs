@@ -1,14 +1,9 @@
 //! Photos from videos, and makers in Python that are faked.
 
-#![cfg(unix)]
-
-use std::os::unix::fs::PermissionsExt;
-
-use super::makers::{Places, choose, installed};
-use super::source::{folder_of, photos_of};
 use super::*;
 use crate::io::video::{VideoSettings, VideoWriter};
-use crate::pipeline::observer::{Progress, Signal, Silent};
+use crate::jobs::poses::makers::installed;
+use crate::jobs::poses::source::{folder_of, photos_of};
 
 /// A video of stripes that move by a pixel each frame; every third frame is plain in its lower half, so less sharp.
 fn video(path: &Path, frames: usize, moves: bool) {
@@ -117,8 +112,8 @@ fn pycolmap_is_found_in_the_active_python_first() {
     python("path/python3", "");
     let active = Some(folder.path().join("active"));
     let places =
-        |python| Places { path: folder.path().join("path").into(), python, own_python: folder.path().join("own") };
-    let names = |places: &Places| {
+        |python| MakerPlaces { path: folder.path().join("path").into(), python, own_python: folder.path().join("own") };
+    let names = |places: &MakerPlaces| {
         let of_python = |m: &Box<dyn PoseMaker>| m.kind() == MakerKind::Pycolmap;
         installed(places).iter().filter(|m| of_python(m)).map(|m| m.name()).collect::<Vec<_>>()
     };
@@ -138,7 +133,7 @@ fn an_environment_is_made_by_pip_and_made_anew_if_that_failed() {
     let folder = tempfile::tempdir().expect("folder");
     let path = folder.path().join("path");
     fs::create_dir(&path).expect("created");
-    let places = Places { path: path.clone().into(), python: None, own_python: folder.path().join("cache/own") };
+    let places = MakerPlaces { path: path.clone().into(), python: None, own_python: folder.path().join("cache/own") };
     assert!(matches!(environment::install(&places, &mut Silent), Err(JobError::NoPython)));
     // Makes an environment whose Python notes what it is asked, and fails while a file says so.
     let here = folder.path().display();
