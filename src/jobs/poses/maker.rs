@@ -42,7 +42,7 @@ pub enum MakerKind {
     BuiltIn,
 }
 
-/// MakerPlaces where makers are looked for.
+/// Places where makers are looked for.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct MakerPlaces {
     /// The variable PATH.
