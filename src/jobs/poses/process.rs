@@ -150,7 +150,11 @@ pub(super) fn progress(line: &str, photos: usize, registered: &mut u64) -> Optio
     let share = match pairs.as_slice() {
         [(done, all)] => done / all,
         // Rows of blocks, each with its columns.
-        [(row, rows), (column, columns)] => (row - 1.0 + column / columns) / rows,
+        [(row, rows), (column, columns)] => {
+            // COLMAP 4 says so before a block, earlier versions after it.
+            let column = column - f64::from(u8::from(line.contains("Processing")));
+            (row - 1.0 + column / columns) / rows
+        }
         _ => return None,
     };
     Some((share.clamp(0.0, 1.0) * photos as f64).round() as u64)

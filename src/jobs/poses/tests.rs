@@ -140,7 +140,9 @@ fn lines_are_read_as_progress() {
     let mut of = |line: &str| progress(line, 100, &mut registered);
     assert_eq!(of("I0101 features.cc:1] Processed file [25/100]"), Some(25));
     assert_eq!(of("Matching block [1/2, 1/2] in 3s"), Some(25));
-    assert_eq!(of("Processing block [2/2, 2/2]"), Some(100));
+    assert_eq!(of("Matching block [2/2, 2/2] in 3s"), Some(100));
+    assert_eq!(of("Processing block [2/2, 2/2]"), Some(75));
+    assert_eq!(of("Processing block [1/1, 1/1]"), Some(0));
     assert_eq!(of("Registering image #17 (3)"), Some(1));
     assert_eq!(of("Registering image #18 (num_reg_frames=4)"), Some(2));
     for other in ["Bundle adjustment report", "Processed file [x/y]", "Processed file [1/0]", "Matching block [1"] {
