@@ -27,8 +27,8 @@ const FEWEST: usize = 3;
 struct VideoNote {
     video: String,
     bytes: u64,
-    /// Seconds since 1970.
-    modified_secs: u64,
+    /// Nanoseconds since 1970.
+    modified_nanos: u64,
     /// Number of photos that was asked for.
     wanted: Option<usize>,
 }
@@ -69,7 +69,7 @@ fn note(video: &Path, wanted: Option<usize>) -> Result<VideoNote, JobError> {
     let meta = fs::metadata(video).map_err(|cause| IoError::Read { path: video.into(), cause })?;
     let since = meta.modified().ok().and_then(|t| t.duration_since(std::time::UNIX_EPOCH).ok());
     let name = video.file_name().unwrap_or_default().to_string_lossy().into_owned();
-    Ok(VideoNote { video: name, bytes: meta.len(), modified_secs: since.map_or(0, |s| s.as_secs()), wanted })
+    Ok(VideoNote { video: name, bytes: meta.len(), modified_nanos: since.map_or(0, |s| s.as_nanos() as u64), wanted })
 }
 
 /// Reads the video twice: to look at all frames, and to store the chosen ones.

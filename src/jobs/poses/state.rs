@@ -17,8 +17,8 @@ pub(super) const FILE: &str = "poses.json";
 struct KnownPhoto {
     name: String,
     bytes: u64,
-    /// Seconds since 1970.
-    modified_secs: u64,
+    /// Nanoseconds since 1970.
+    modified_nanos: u64,
 }
 
 /// Note on poses in a folder.
@@ -78,7 +78,7 @@ fn known(photos: &Unposed) -> Result<Vec<KnownPhoto>, JobError> {
         Ok(KnownPhoto {
             name: name.clone(),
             bytes: meta.len(),
-            modified_secs: since.map_or(0, |since| since.as_secs()),
+            modified_nanos: since.map_or(0, |since| since.as_nanos() as u64),
         })
     };
     photos.photos.iter().map(of).collect()

@@ -85,17 +85,17 @@ fn what_is_no_video_is_told_with_the_reason() {
     let path = folder.path().join("a.mp4");
     video(&path, 5);
     let whole = fs::read(&path).expect("read");
-    let mut told = |bytes: &[u8], name: &str| {
+    let told = |bytes: &[u8], name: &str| {
         let path = folder.path().join(name);
         fs::write(&path, bytes).expect("written");
         pictures(&path).err().map(|e| e.to_string()).unwrap_or_default()
     };
     for (bytes, part) in [
         (&b""[..], "it is empty"),
-        (b"not a video at all, but some text", "does not begin like an MP4"),
+        (&b"not a video at all, but some text"[..], "does not begin like an MP4"),
         (&whole[..64], "cut off"),
-        (&replaced(&whole, b"vide", b"soun"), "no picture, only sound"),
-        (&replaced(&whole, b"moov", b"free"), "no index"),
+        (&replaced(&whole, b"vide", b"soun")[..], "no picture, only sound"),
+        (&replaced(&whole, b"moov", b"free")[..], "no index"),
     ] {
         let text = told(bytes, "b.mp4");
         assert!(text.contains(part) && text.contains("b.mp4"), "'{part}' is missing in {text}");

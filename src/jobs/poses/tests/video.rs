@@ -6,15 +6,14 @@ use crate::jobs::poses::makers::installed;
 use crate::jobs::poses::source::{folder_of, photos_of};
 
 /// A video of stripes that move by a pixel each frame; every third frame is plain in its lower half, so less sharp.
-fn video(path: &Path, frames: usize, moves: bool) {
+fn video(path: &Path, frames: usize) {
     let (w, h) = (64, 48);
     let settings = VideoSettings { width_px: w, height_px: h, overwrite: true, ..VideoSettings::default() };
     let mut writer = VideoWriter::create(path, &settings).expect("created");
     for i in 0..frames {
-        let shift = if moves { i as u32 } else { 0 };
         let value = |x: u32, y: u32| match (i % 3, y < h / 2) {
             (1, false) => 120,
-            _ => 40 + 150 * u8::from((x + shift) / 5 % 2 == 0),
+            _ => 40 + 150 * u8::from((x + i as u32) / 5 % 2 == 0),
         };
         let rgb: Vec<u8> = (0..h).flat_map(|y| (0..w).flat_map(move |x| [value(x, y); 3])).collect();
         writer.push(&rgb).expect("pushed");
@@ -45,7 +44,7 @@ impl Observer for CancelIn {
 fn a_video_becomes_photos_once_and_never_among_other_files() {
     let folder = tempfile::tempdir().expect("folder");
     let path = folder.path().join("walk.mp4");
-    video(&path, 12, true);
+    video(&path, 12);
     let photos = photos_of(&path, None, &mut Silent).expect("taken");
     assert_eq!((photos.images.as_path(), photos.video.as_deref()), (folder_of(&path).as_path(), Some(&*path)));
     assert_eq!(photos.photos.len(), 12, "a short video gives all that differ");
@@ -69,13 +68,12 @@ fn a_video_becomes_photos_once_and_never_among_other_files() {
 fn a_canceled_or_still_video_leaves_nothing() {
     let folder = tempfile::tempdir().expect("folder");
     let path = folder.path().join("walk.mp4");
-    video(&path, 12, true);
+    video(&path, 12);
     for stage in ["Looking at the video", "Taking photos from the video"] {
         let error = photos_of(&path, None, &mut CancelIn(stage, 5)).expect_err("canceled");
         assert!(error.is_cancelled(), "{error}");
         assert_eq!(listed(folder.path()), ["walk.mp4"], "{stage}");
     }
-    video(&path, 12, false);
     fs::write(&path, fs::read(&path).expect("read")).expect("written");
     let still = folder.path().join("still.mp4");
     let settings = VideoSettings { width_px: 64, height_px: 48, ..VideoSettings::default() };
@@ -91,7 +89,7 @@ fn a_canceled_or_still_video_leaves_nothing() {
 fn a_video_opens_as_photos_without_poses() {
     let folder = tempfile::tempdir().expect("folder");
     let path = folder.path().join("walk.mp4");
-    video(&path, 5, true);
+    video(&path, 5);
     let Err(crate::io::OpenError::NoPoses(photos)) = io::open(&path) else { panic!("it has no poses") };
     assert_eq!((photos.video.as_deref(), photos.photos.len()), (Some(&*path), 0));
     assert!(photos.found().contains("walk.mp4: a video, no camera poses"));
@@ -114,8 +112,9 @@ fn pycolmap_is_found_in_the_active_python_first() {
     let places =
         |python| MakerPlaces { path: folder.path().join("path").into(), python, own_python: folder.path().join("own") };
     let names = |places: &MakerPlaces| {
-        let of_python = |m: &Box<dyn PoseMaker>| m.kind() == MakerKind::Pycolmap;
-        installed(places).iter().filter(|m| of_python(m)).map(|m| m.name()).collect::<Vec<_>>()
+        let all = installed(places);
+        let of_python = all.iter().filter(|maker| maker.kind() == MakerKind::Pycolmap);
+        of_python.map(|maker| maker.name()).collect::<Vec<_>>()
     };
     assert!(names(&places(None)).is_empty(), "a Python without the package");
     python("own/bin/python3", "pycolmap 4.0.0");
