@@ -10,7 +10,7 @@ const SIZE: (u32, u32) = (64, 48);
 
 /// A video of this many frames; each is one color with a brighter top left quarter.
 fn video(path: &Path, frames: u8) {
-    let settings = VideoSettings { width_px: SIZE.0, height_px: SIZE.1, ..VideoSettings::default() };
+    let settings = VideoSettings::new(SIZE.0, SIZE.1, 30.0);
     let mut writer = VideoWriter::create(path, &settings).expect("created");
     for i in 0..frames {
         let pixel = |x: u32, y: u32| if x < SIZE.0 / 2 && y < SIZE.1 / 2 { [220; 3] } else { [40 + 8 * i; 3] };
@@ -31,9 +31,9 @@ fn pictures(path: &Path) -> Result<Vec<RgbImage>, FootageError> {
     Ok(all)
 }
 
-/// Replaces bytes that occur once or more.
+/// Replaces the last occurrence of some bytes.
 fn replaced(bytes: &[u8], from: &[u8], to: &[u8]) -> Vec<u8> {
-    let at = bytes.windows(from.len()).position(|w| w == from).expect("it is there");
+    let at = bytes.windows(from.len()).rposition(|w| w == from).expect("it is there");
     [&bytes[..at], to, &bytes[at + from.len()..]].concat()
 }
 
@@ -93,7 +93,7 @@ fn what_is_no_video_is_told_with_the_reason() {
     for (bytes, part) in [
         (&b""[..], "it is empty"),
         (&b"not a video at all, but some text"[..], "does not begin like an MP4"),
-        (&whole[..64], "cut off"),
+        (&whole[..whole.len() / 2], "cut off"),
         (&replaced(&whole, b"vide", b"soun")[..], "no picture, only sound"),
         (&replaced(&whole, b"moov", b"free")[..], "no index"),
     ] {
@@ -114,7 +114,7 @@ fn what_is_no_video_is_told_with_the_reason() {
 fn tiny_frames_are_refused() {
     let folder = tempfile::tempdir().expect("folder");
     let path = folder.path().join("a.mp4");
-    let settings = VideoSettings { width_px: 16, height_px: 16, ..VideoSettings::default() };
+    let settings = VideoSettings::new(16, 16, 30.0);
     let mut writer = VideoWriter::create(&path, &settings).expect("created");
     writer.push(&[9; 16 * 16 * 3]).expect("pushed");
     writer.finish().expect("finished");

@@ -8,7 +8,7 @@ use crate::jobs::poses::source::{folder_of, photos_of};
 /// A video of stripes that move by a pixel each frame; every third frame is plain in its lower half, so less sharp.
 fn video(path: &Path, frames: usize) {
     let (w, h) = (64, 48);
-    let settings = VideoSettings { width_px: w, height_px: h, overwrite: true, ..VideoSettings::default() };
+    let settings = VideoSettings::new(w, h, 30.0);
     let mut writer = VideoWriter::create(path, &settings).expect("created");
     for i in 0..frames {
         let value = |x: u32, y: u32| match (i % 3, y < h / 2) {
@@ -76,7 +76,7 @@ fn a_canceled_or_still_video_leaves_nothing() {
     }
     fs::write(&path, fs::read(&path).expect("read")).expect("written");
     let still = folder.path().join("still.mp4");
-    let settings = VideoSettings { width_px: 64, height_px: 48, ..VideoSettings::default() };
+    let settings = VideoSettings::new(64, 48, 30.0);
     let mut writer = VideoWriter::create(&still, &settings).expect("created");
     (0..20).for_each(|_| writer.push(&[90; 64 * 48 * 3]).expect("pushed"));
     writer.finish().expect("finished");
