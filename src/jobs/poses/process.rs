@@ -101,6 +101,8 @@ fn quiet(program: &Path) -> Command {
     let mut command = Command::new(program);
     // Without a display, COLMAP's use of Qt would end it.
     command.env("QT_QPA_PLATFORM", "offscreen");
+    // Python imports nothing from the folder that the user happens to be in.
+    command.env("PYTHONSAFEPATH", "1");
     #[cfg(target_os = "linux")]
     {
         use std::os::unix::process::CommandExt;
