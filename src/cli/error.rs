@@ -6,8 +6,9 @@ use std::process::ExitCode;
 use super::{STOPPED, output};
 use crate::io::OpenError;
 use crate::io::results::MethodKind;
+use crate::jobs::JobError;
 use crate::jobs::error::chain;
-use crate::jobs::{JobError, poses};
+use crate::jobs::poses::environment::TERMS;
 use crate::measure::BeginError;
 use crate::pipeline::observer::Interrupted;
 use crate::pipeline::train::TrainError;
@@ -37,11 +38,18 @@ impl CliError {
         let remedy = match &error {
             _ if error.is_cancelled() => return Self::Cancelled(chain(&error)),
             JobError::EmptyQuery => return Self::Usage(error.to_string()),
+            JobError::NoPoseMaker(None) => {
+                format!(
+                    ". 'fmlgs poses PHOTOS --install' {TERMS}; without it, 'fmlgs poses PHOTOS --by-hand' shows commands"
+                )
+            }
             JobError::NotTrained(path) => format!(", with 'fmlgs train {} --out SCENE'", path.display()),
             JobError::PhotosGone(_) => "; give them with --photos".into(),
             JobError::Open(OpenError::NoPoses(photos)) => {
-                let commands: String = poses::commands(photos).iter().map(|line| format!("\n  {line}")).collect();
-                format!(". COLMAP finds them, and the window runs it where it is installed; by hand:{commands}")
+                format!(
+                    "; find them with 'fmlgs poses {0}', or train at once with 'fmlgs train {0}'",
+                    photos.folder.display()
+                )
             }
             JobError::TestPhotos { .. } => {
                 return Self::Usage(format!("--held-out-every has no effect here: {error}. Leave the option out"));

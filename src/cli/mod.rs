@@ -36,6 +36,7 @@ mod number;
 mod output;
 mod path;
 mod plan;
+mod poses;
 mod preprocess;
 mod process;
 mod progress;
@@ -87,6 +88,7 @@ Examples:
   fmlgs photos/                         open the window with a folder of posed photos
   fmlgs demo                            open the window with the trained demo
   fmlgs info photos/                    say what a folder or file is
+  fmlgs poses walk.mp4                  camera poses of photos, or of a video's frames
   fmlgs train photos/ --out scene/      train; the same command again resumes where it stopped
   fmlgs eval scene/ --pictures cmp/     PSNR and SSIM on held-out photos, pictures side by side
   fmlgs render scene/ --camera 12 --out view.png
@@ -131,6 +133,7 @@ struct Cli {
 #[derive(Debug, Subcommand)]
 enum Command {
     Info(info::InfoArgs),
+    Poses(poses::PosesArgs),
     Train(train::TrainArgs),
     Render(render::RenderArgs),
     Eval(eval::EvalArgs),
@@ -222,6 +225,7 @@ fn run(cli: Cli, open_window: OpenWindow) -> Result<(), CliError> {
     interrupt::listen(matches!(command, Command::Batch(_)));
     match command {
         Command::Info(args) => info::run(args),
+        Command::Poses(args) => poses::run(&args, quiet),
         Command::Models(args) => models::run(args, quiet),
         Command::Train(args) => train::run(args, quiet),
         Command::Render(args) => render::run(args, quiet),

@@ -9,11 +9,14 @@ use super::plan::PlanArgs;
 use super::progress::Console;
 use super::serve::{AccessArgs, announce};
 use super::{CliError, interrupt, number, output};
+use crate::io::OpenError;
 use crate::io::scene_files::CHECKPOINT_FILE;
+use crate::io::unposed::Unposed;
 use crate::jobs::open::{self, Contents};
+use crate::jobs::poses::front_door::{self, PoseRequest};
 use crate::jobs::presets;
 use crate::jobs::train::{IfChanged, TrainStart, Trained};
-use crate::jobs::{JobError, held_out, plan, train};
+use crate::jobs::{Folders, JobError, held_out, plan, train};
 use crate::pipeline::observer::{Observer, Severity};
 use crate::pipeline::train::checkpoint::CheckpointError;
 use crate::pipeline::train::{TrainConfig, TrainError};
@@ -29,13 +32,15 @@ use crate::scene::{AlphaUse, Dataset};
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  \
     fmlgs train photos/ --out scene/\n  \
+    fmlgs train walk.mp4 --out scene/        a video: photos, poses and training in one\n  \
     fmlgs train photos/ --out scene/ --steps 30000 --max-side 1600\n  \
     fmlgs train photos/ --out quick/ --steps 500 --max-side 256 --no-densify\n  \
     fmlgs train photos/ --serve              watch from another computer, see fmlgs connect\n  \
     fmlgs train other/ --preset scene/training.toml\n  \
     fmlgs train scene/                       resume a scene that was canceled, same settings")]
 pub(crate) struct TrainArgs {
-    /// Dataset folder or transforms.json; or a trained scene, to resume it
+    /// Dataset folder or transforms.json; photos without poses or a video, whose poses are found first; or a trained
+    /// scene, to resume it
     data: PathBuf,
     /// Folder of the trained scene [default: out/NAME, the name of the dataset; out/NAME-2 and so on where that
     /// was trained with other settings]
@@ -162,8 +167,12 @@ impl TrainOverrides {
 impl TrainArgs {
     /// Returns the photos, the settings and the folders to try: the given one, or the usual ones in order, of which the
     /// first without a training with other settings is taken.
-    fn check(&self) -> Result<(Dataset, TrainConfig, Vec<PathBuf>), CliError> {
-        let (dataset, base, own) = match open::contents(&self.data, None)? {
+    fn check(&self, console: &mut Console) -> Result<(Dataset, TrainConfig, Vec<PathBuf>), CliError> {
+        let contents = match open::contents(&self.data, None) {
+            Err(JobError::Open(OpenError::NoPoses(photos))) => Contents::Photos(posed(*photos, console)?),
+            contents => contents?,
+        };
+        let (dataset, base, own) = match contents {
             Contents::Photos(dataset) => (dataset, TrainConfig::default(), None),
             Contents::Scene(scene) if scene.folder.is_some() => {
                 let Some(photos) = &scene.dataset_path else {
@@ -206,6 +215,15 @@ impl TrainArgs {
     }
 }
 
+/// Photos of which the poses are found first, or were found before.
+fn posed(photos: Unposed, console: &mut Console) -> Result<Dataset, CliError> {
+    let name = front_door::name_of(&photos);
+    let request = PoseRequest { photos, ..PoseRequest::default() };
+    let found = front_door::find_here(&request, &Folders::of_user(), console)?;
+    found.tell(console);
+    Ok(Dataset { name, ..open::dataset(&found.out)? })
+}
+
 /// Folders `first`, `first-2` and so on that exist, and the next one.
 fn usual_folders(first: &Path) -> Vec<PathBuf> {
     let folder = |n: usize| if n == 1 { first.to_owned() } else { PathBuf::from(format!("{}-{n}", first.display())) };
@@ -214,9 +232,9 @@ fn usual_folders(first: &Path) -> Vec<PathBuf> {
 }
 
 pub(crate) fn run(args: TrainArgs, quiet: bool) -> Result<(), CliError> {
-    let (dataset, config, folders) = args.check()?;
-    let changed = if args.anyway { IfChanged::GoOn } else { IfChanged::Anew };
     let mut console = Console::new(quiet);
+    let (dataset, config, folders) = args.check(&mut console)?;
+    let changed = if args.anyway { IfChanged::GoOn } else { IfChanged::Anew };
     for warning in &dataset.warnings {
         console.note(Severity::Warning, warning.clone());
     }

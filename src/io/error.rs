@@ -4,6 +4,7 @@ use std::io;
 use std::path::{Path, PathBuf};
 
 use super::unposed::Unposed;
+use super::video::footage::FootageError;
 use crate::scene::{CameraError, CloudError};
 
 /// A file that could not be read or written.
@@ -99,9 +100,11 @@ pub enum OpenError {
     NotFound { path: PathBuf },
     #[error("{path} is not a scene, splat or photo set that FMLGS can open. Looked for: {looked_for}. Found: {found}.")]
     Unrecognized { path: PathBuf, looked_for: String, found: String },
-    /// Photos without camera poses.
-    #[error("{}: {} photos, no camera poses{}", .0.images.display(), .0.photos.len(), .0.in_brackets())]
+    /// Photos or a video without camera poses.
+    #[error("{}", .0.found())]
     NoPoses(Box<Unposed>),
+    #[error(transparent)]
+    Footage(#[from] FootageError),
     #[error("{path} is {what}; unpack it, with {command}, and open the folder")]
     Packed { path: PathBuf, what: String, command: String },
     #[error(transparent)]

@@ -1,8 +1,10 @@
-//! Focal lengths in EXIF, the TIFF structure that cameras embed in photos. Nothing in it is trusted: offsets are
-//! checked, and a focal length that no lens has is `None`.
+//! Focal lengths in EXIF, the TIFF structure that cameras embed in photos. Nothing in it is trusted: a focal length that
+//! no lens has is told apart.
 
 use std::ops::RangeInclusive;
 use std::path::Path;
+
+use ::exif::{In, Rational, Reader, Tag, Value};
 
 use super::{IoError, photo};
 
@@ -10,15 +12,6 @@ use super::{IoError, photo};
 const BELIEVED: RangeInclusive<f64> = 0.2..=30.0;
 /// Diagonal of 35 mm film, mm, to which equivalent focal lengths refer.
 const FILM_DIAGONAL_MM: f64 = 43.27;
-/// Entries of a directory at most that are looked at.
-const MOST_ENTRIES: u16 = 512;
-
-const DIRECTORY: u16 = 0x8769;
-const FOCAL_MM: u16 = 0x920A;
-const FOCAL_ON_FILM_MM: u16 = 0xA405;
-const SENSOR_RESOLUTION: u16 = 0xA20E;
-const SENSOR_UNIT: u16 = 0xA210;
-const SENSOR_WIDTH_PX: u16 = 0xA002;
 
 /// Statement of EXIF about a focal length.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -39,23 +32,27 @@ pub(crate) fn focal(path: &Path, size: (u32, u32)) -> Result<ExifFocal, IoError>
 /// The focal length in an EXIF block.
 fn parse(bytes: &[u8], (width, height): (u32, u32)) -> ExifFocal {
     let bytes = bytes.strip_prefix(b"Exif\0\0").unwrap_or(bytes);
-    let Some(tiff) = Tiff::new(bytes) else { return ExifFocal::Unsaid };
-    let Some(exif) = tiff.first_directory().and_then(|first| tiff.number(first, DIRECTORY)) else {
-        return ExifFocal::Unsaid;
+    let mut reader = Reader::new();
+    // One broken field, such as a maker's own, does not hide the others.
+    let read = reader.continue_on_error(true).read_raw(bytes.to_vec()).or_else(|e| e.distill_partial_result(|_| {}));
+    let Ok(block) = read else { return ExifFocal::Unsaid };
+    let number = |tag: Tag| match &block.get_field(tag, In::PRIMARY)?.value {
+        Value::Rational(ratios) => ratios.first().map(Rational::to_f64),
+        other => other.get_uint(0).map(f64::from),
     };
-    let tag = |tag: u16| tiff.number(exif as usize, tag).filter(|v| *v != 0.0);
+    let tag = |tag: Tag| number(tag).filter(|v| *v != 0.0);
     let (width, height) = (f64::from(width), f64::from(height));
     let longer = width.max(height);
-    let on_film = tag(FOCAL_ON_FILM_MM).map(|mm| mm * width.hypot(height) / FILM_DIAGONAL_MM / longer);
+    let on_film = tag(Tag::FocalLengthIn35mmFilm).map(|mm| mm * width.hypot(height) / FILM_DIAGONAL_MM / longer);
     let on_sensor = || {
-        let unit_mm = match tag(SENSOR_UNIT)? as u16 {
+        let unit_mm = match tag(Tag::FocalPlaneResolutionUnit)? as u16 {
             2 => 25.4,
             3 => 10.0,
             4 => 1.0,
             _ => return None,
         };
         // The photo may have been made smaller since.
-        Some(tag(FOCAL_MM)? * tag(SENSOR_RESOLUTION)? / unit_mm / tag(SENSOR_WIDTH_PX)?)
+        Some(tag(Tag::FocalLength)? * tag(Tag::FocalPlaneXResolution)? / unit_mm / tag(Tag::PixelXDimension)?)
     };
     match on_film.or_else(on_sensor) {
         None => ExifFocal::Unsaid,
@@ -64,55 +61,33 @@ fn parse(bytes: &[u8], (width, height): (u32, u32)) -> ExifFocal {
     }
 }
 
-/// A TIFF structure in memory.
-struct Tiff<'a> {
-    bytes: &'a [u8],
-    big: bool,
-}
-
-impl<'a> Tiff<'a> {
-    fn new(bytes: &'a [u8]) -> Option<Self> {
-        match bytes.get(..4)? {
-            b"II*\0" => Some(Self { bytes, big: false }),
-            b"MM\0*" => Some(Self { bytes, big: true }),
-            _ => None,
+/// The bytes of a JPEG without its EXIF blocks; of anything else, all of them.
+pub(crate) fn without(bytes: &[u8]) -> Vec<u8> {
+    let Some(mut rest) = bytes.strip_prefix(b"\xFF\xD8") else { return bytes.to_vec() };
+    let mut kept = b"\xFF\xD8".to_vec();
+    // Segments up to the start of the picture's data (DA): a marker, and a length that counts itself.
+    while let [0xFF, marker, high, low, ..] = *rest {
+        let length = 2 + usize::from(u16::from_be_bytes([high, low]));
+        let Some((segment, after)) = rest.split_at_checked(length).filter(|_| marker != 0xDA) else { break };
+        if !(marker == 0xE1 && segment.get(4..).is_some_and(|content| content.starts_with(b"Exif\0"))) {
+            kept.extend(segment);
         }
+        rest = after;
     }
-
-    fn u16(&self, at: usize) -> Option<u16> {
-        let b = *self.bytes.get(at..)?.first_chunk()?;
-        Some(if self.big { u16::from_be_bytes(b) } else { u16::from_le_bytes(b) })
-    }
-
-    fn u32(&self, at: usize) -> Option<u32> {
-        let b = *self.bytes.get(at..)?.first_chunk()?;
-        Some(if self.big { u32::from_be_bytes(b) } else { u32::from_le_bytes(b) })
-    }
-
-    fn first_directory(&self) -> Option<usize> {
-        self.u32(4).map(|at| at as usize)
-    }
-
-    /// The first number of a tag in a directory: a short, a long, or a ratio of two longs.
-    fn number(&self, directory: usize, tag: u16) -> Option<f64> {
-        let entries = usize::from(self.u16(directory)?.min(MOST_ENTRIES));
-        let mut places = (0..entries).filter_map(|i| directory.checked_add(2 + 12 * i));
-        let entry = places.find(|&at| self.u16(at) == Some(tag))?;
-        match self.u16(entry + 2)? {
-            3 => self.u16(entry + 8).map(f64::from),
-            4 => self.u32(entry + 8).map(f64::from),
-            5 => {
-                let at = self.u32(entry + 8)? as usize;
-                Some(f64::from(self.u32(at)?) / f64::from(self.u32(at.checked_add(4)?)?))
-            }
-            _ => None,
-        }
-    }
+    kept.extend(rest);
+    kept
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    const DIRECTORY: u16 = 0x8769;
+    const FOCAL_MM: u16 = 0x920A;
+    const FOCAL_ON_FILM_MM: u16 = 0xA405;
+    const SENSOR_RESOLUTION: u16 = 0xA20E;
+    const SENSOR_UNIT: u16 = 0xA210;
+    const SENSOR_WIDTH_PX: u16 = 0xA002;
 
     /// An EXIF block with these tags (tag, type, value) in its EXIF directory; ratios stand behind it.
     fn block(tags: &[(u16, u16, [u32; 2])], big: bool) -> Vec<u8> {
@@ -125,7 +100,7 @@ mod tests {
         [&short(DIRECTORY)[..], &short(4), &long(1), &long(directory)].iter().for_each(|b| out.extend(*b));
         out.extend(long(0));
         out.extend(short(tags.len() as u16));
-        let behind = directory + 2 + 12 * tags.len() as u32;
+        let behind = directory + 2 + 12 * tags.len() as u32 + 4;
         for (i, (tag, kind, value)) in tags.iter().enumerate() {
             [short(*tag), short(*kind)].iter().for_each(|b| out.extend(b));
             out.extend(long(1));
@@ -135,6 +110,7 @@ mod tests {
                 _ => out.extend(long(behind + 8 * i as u32)),
             }
         }
+        out.extend(long(0));
         tags.iter().for_each(|(.., value)| value.iter().for_each(|v| out.extend(long(*v))));
         out
     }
@@ -159,6 +135,22 @@ mod tests {
             };
             assert!((sides - 50.0 / 36.0).abs() < 1e-9, "{sides}");
         }
+    }
+
+    #[test]
+    fn a_photo_without_its_block_is_the_same_picture() {
+        let mut plain = Vec::new();
+        let picture = image::RgbImage::from_fn(16, 8, |x, y| image::Rgb([16 * x as u8, 30 * y as u8, 7]));
+        picture.write_with_encoder(image::codecs::jpeg::JpegEncoder::new(&mut plain)).expect("encoded");
+        let exif = [&b"Exif\0\0"[..], &block(&[(FOCAL_ON_FILM_MM, 3, [1, 0])], true)].concat();
+        let segment = [&[0xFF, 0xE1][..], &(exif.len() as u16 + 2).to_be_bytes(), &exif].concat();
+        let with = [&plain[..2], &segment, &plain[2..]].concat();
+        assert_eq!(without(&with), plain);
+        assert_eq!(without(&plain), plain, "the control");
+        for cut in 0..with.len() {
+            assert!(without(&with[..cut]).len() <= cut, "{cut}");
+        }
+        assert_eq!(without(b"no JPEG"), b"no JPEG");
     }
 
     #[test]

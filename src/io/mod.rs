@@ -39,6 +39,7 @@ mod pixel_masks;
 mod ply;
 pub mod points_ply;
 mod posed;
+pub(crate) mod program;
 mod quantized;
 mod reader;
 mod removed;

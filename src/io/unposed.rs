@@ -1,4 +1,4 @@
-//! Photos without known camera poses.
+//! Photos without known camera poses, or a video that photos are taken from.
 
 use std::path::{Path, PathBuf};
 
@@ -22,11 +22,33 @@ pub struct Unposed {
     pub images: PathBuf,
     /// Names of the photos in it, in order.
     pub photos: Vec<String>,
+    /// The video that the photos are frames of, or will be: then there may be none yet.
+    pub video: Option<PathBuf>,
     /// Sentences on other findings: pictures that cannot be read, poses in formats of other programs; may be empty.
     pub(crate) beside: String,
 }
 
 impl Unposed {
+    /// A video, from which no photos were taken yet.
+    pub(crate) fn of_video(path: &Path) -> Self {
+        Self { folder: path.into(), images: path.into(), video: Some(path.into()), ..Self::default() }
+    }
+
+    /// Sentence on what was found.
+    pub(crate) fn found(&self) -> String {
+        match &self.video {
+            Some(video) => format!("{}: a video, no camera poses", video.display()),
+            None => {
+                format!(
+                    "{}: {} photos, no camera poses{}",
+                    self.images.display(),
+                    self.photos.len(),
+                    self.in_brackets()
+                )
+            }
+        }
+    }
+
     /// Adds one more sentence to [`Self::beside`].
     pub(super) fn with(self, sentence: Option<String>) -> Self {
         let all: Vec<String> = sentence.into_iter().chain(Some(self.beside).filter(|b| !b.is_empty())).collect();
@@ -34,7 +56,7 @@ impl Unposed {
     }
 
     /// Other findings, in brackets after a sentence.
-    pub(super) fn in_brackets(&self) -> String {
+    fn in_brackets(&self) -> String {
         if self.beside.is_empty() { String::new() } else { format!(" ({})", self.beside) }
     }
 }
@@ -59,7 +81,7 @@ pub(super) fn find(folder: &Path) -> Result<Option<Unposed>, IoError> {
                 .into_iter()
                 .collect();
             beside.extend(poses(&[folder, &images]));
-            return Ok(Some(Unposed { folder: folder.into(), images, photos, beside: beside.join(". ") }));
+            return Ok(Some(Unposed { folder: folder.into(), images, photos, video: None, beside: beside.join(". ") }));
         }
         if unread.len() + photos.len() >= FEWEST {
             let n = unread.len();

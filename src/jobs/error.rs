@@ -3,8 +3,10 @@
 use std::error::Error;
 use std::path::PathBuf;
 
+use super::poses::MakerKind;
 use crate::io::memory::NoRoom;
 use crate::io::results::Method;
+use crate::io::video::footage::FootageError;
 use crate::io::{IoError, OpenError};
 use crate::measure::{BeginError, ReportError, StudyError};
 use crate::models::ModelError;
@@ -111,9 +113,21 @@ pub enum JobError {
         /// Its last output.
         said: String,
     },
-    /// COLMAP is needed and not installed.
-    #[error("neither COLMAP nor GLOMAP is installed here: 'colmap' is not found on the PATH")]
-    NoTools,
+    /// No maker of camera poses is here, or not the wanted one.
+    #[error("{}", no_maker(*.0))]
+    NoPoseMaker(Option<MakerKind>),
+    /// The maker that is built in failed.
+    #[error("finding camera poses: {0}; the photos may overlap too little or have too little texture")]
+    #[cfg(feature = "sfm")]
+    BuiltInPoses(String),
+    /// There is no Python for an environment of its own.
+    #[error("there is no Python ('python3' on the PATH) to install pycolmap into; install Python from python.org")]
+    NoPython,
+    #[error(transparent)]
+    Footage(#[from] FootageError),
+    /// A video that gives too few different photos.
+    #[error("{}: the camera hardly moves, so there are too few different photos; walk around things while recording", .0.display())]
+    StillVideo(PathBuf),
     /// Photos that overlap too little.
     #[error("{}: no camera poses were found; the photos overlap too little or have too little texture", .0.display())]
     NoPosesFound(PathBuf),
@@ -185,6 +199,28 @@ impl JobError {
             )
         );
         fetch || Interrupted::is_cause_of(self)
+    }
+}
+
+/// Sentence on a maker of camera poses that is not here.
+fn no_maker(wanted: Option<MakerKind>) -> String {
+    match wanted {
+        None => "nothing here finds camera poses: neither COLMAP ('colmap' on the PATH, from colmap.github.io) nor pycolmap \
+                 (in the active Python) is installed"
+            .into(),
+        Some(MakerKind::Colmap) => {
+            "COLMAP is not installed: 'colmap' is not found on the PATH; get it from colmap.github.io".into()
+        }
+        Some(MakerKind::Pycolmap) => {
+            "pycolmap is not found in the active Python (VIRTUAL_ENV, or 'python3' on the PATH); 'pip install pycolmap' \
+             adds it"
+                .into()
+        }
+        Some(MakerKind::BuiltIn) => {
+            "this program was built without its own maker of poses; build it with 'cargo build --release --features sfm \
+             --ignore-rust-version'"
+                .into()
+        }
     }
 }
 

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use sha2::{Digest, Sha256};
 
-use crate::io::data_folder::data_folder;
+use crate::io::data_folder::{cache_folder, data_folder};
 use crate::io::scene_files::{SCENE_FILE, is_scene};
 use crate::io::{IoError, atomic, files};
 
@@ -117,6 +117,11 @@ impl Folders {
     pub(crate) fn of_remote(&self, host: &str) -> PathBuf {
         let name: String = host.chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '-' }).collect();
         self.data.join("remote").join(name)
+    }
+
+    /// Folder for what can be fetched again.
+    pub(crate) fn cache(&self) -> PathBuf {
+        cache_folder(&self.data)
     }
 
     /// Folder for the camera poses of the photos at `root`.

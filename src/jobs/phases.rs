@@ -50,8 +50,13 @@ pub(crate) const CLEANING: &[Phase] = &[
     ("Comparing with the photos", 35.0),
 ];
 /// Phases of finding camera poses.
-pub(crate) const POSES: &[Phase] =
-    &[("Finding features", 20.0), ("Matching photos", 30.0), ("Finding camera poses", 50.0)];
+pub(crate) const POSES: &[Phase] = &[
+    ("Looking at the video", 6.0),
+    ("Taking photos from the video", 4.0),
+    ("Finding features", 18.0),
+    ("Matching photos", 27.0),
+    ("Finding camera poses", 45.0),
+];
 /// Phases of exporting Gaussians.
 pub(crate) const EXPORT: &[Phase] = &[("Writing Gaussians", 70.0), ("Measuring the loss", 30.0)];
 /// Phases of exporting everything.

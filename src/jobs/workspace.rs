@@ -8,11 +8,11 @@ use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 use super::edit::{self, EditRequest};
 use super::evaluate::{self, EvaluateOptions, PhotoComparison};
 use super::find_objects::{self, FindRequest};
+use super::poses::front_door::{self, PoseQuestion, PoseRequest};
 use super::rearrange::{self, RearrangeRequest, RearrangedScene};
 use super::runs::{self, RunSummary};
 use super::train::{self, TrainStart, Trained};
-use super::{Folders, JobError, OpenedScene, Scene, demo, open, plan, poses, report, scale};
-use crate::io::unposed::Unposed;
+use super::{Folders, JobError, OpenedScene, Scene, demo, open, plan, report, scale};
 use crate::io::{OpenError, trained};
 use crate::pipeline::observer::{Evaluation, Interrupted, Observer};
 use crate::pipeline::train::checkpoint::CheckpointError;
@@ -32,8 +32,8 @@ pub struct Workspace {
 pub enum OpenedPath {
     /// A scene.
     Scene(Box<OpenedScene>),
-    /// Photos whose camera poses are unknown.
-    Unposed(Box<Unposed>),
+    /// Photos or a video whose camera poses are unknown.
+    Unposed(Box<PoseQuestion>),
 }
 
 /// Result of training in the workspace.
@@ -84,7 +84,9 @@ impl Workspace {
     /// Reads a dataset, a splat or a trained scene.
     pub fn open(&self, path: &Path, observer: &mut dyn Observer) -> Result<OpenedPath, JobError> {
         match open::open(path, &self.folders, self.machine(), observer) {
-            Err(JobError::Open(OpenError::NoPoses(photos))) => Ok(OpenedPath::Unposed(photos)),
+            Err(JobError::Open(OpenError::NoPoses(photos))) => {
+                Ok(OpenedPath::Unposed(Box::new(PoseQuestion::of(*photos, &self.folders))))
+            }
             opened => Ok(OpenedPath::Scene(Box::new(self.opened(opened?)))),
         }
     }
@@ -104,11 +106,15 @@ impl Workspace {
         Ok(self.opened(demo::open_photos(&self.folders, self.machine(), observer)?))
     }
 
-    /// Finds the camera poses of photos with programs that are installed, and reads the result.
-    pub(crate) fn find_poses(&self, photos: &Unposed, observer: &mut dyn Observer) -> Result<OpenedScene, JobError> {
-        let tools = poses::PoseTools::installed().ok_or(JobError::NoTools)?;
-        let found = poses::find(photos, &tools, &self.folders, observer)?;
-        Ok(self.opened(open::open(&found, &self.folders, self.machine(), observer)?))
+    /// Finds the camera poses of photos or a video, and reads the result.
+    pub(crate) fn find_poses(
+        &self,
+        request: &PoseRequest,
+        observer: &mut dyn Observer,
+    ) -> Result<OpenedScene, JobError> {
+        let found = front_door::find_here(request, &self.folders, observer)?;
+        found.tell(observer);
+        Ok(self.opened(open::open(&found.out, &self.folders, self.machine(), observer)?))
     }
 
     /// Fits Gaussians to photos, in `out` or in the first folder that is free for these settings.

@@ -163,6 +163,15 @@ pub(super) const RULES: &[Rule] = &[
     rule(&["locate"], &["check_others", "unknown_focal", "check_changes"], |g| {
         when(!g.has("check"), "without --check")
     }),
+    rule(&["poses"], &["out", "maker", "frames", "install", "compare", "json"], |g| {
+        when(g.has("by_hand"), "with --by-hand, which finds nothing")
+    }),
+    rule(&["poses"], &["install"], |g| {
+        when(
+            g.is("maker", "colmap") || g.is("maker", "built-in"),
+            "with this --maker: it is pycolmap that is installed",
+        )
+    }),
     rule(&["locate"], &["focal_px", "out"], |g| when(g.has("check"), "with --check, which locates held-out photos")),
     // Pictures and flights.
     rule(&["render"], &["quality", "fps", "mark", "ffmpeg"], |g| when(!g.has("path"), "without --path")),

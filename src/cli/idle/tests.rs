@@ -257,6 +257,12 @@ const LINES: &[(&str, &[&str], &str)] = &[
         &["--check-others o", "--unknown-focal", "--check-changes"],
         "locate s --check --check-others o --unknown-focal --check-changes",
     ),
+    (
+        "poses p --by-hand {}",
+        &["--out o", "--maker colmap", "--frames 9", "--install", "--compare g", "--json"],
+        "poses p --out o --frames 9 --compare g --json",
+    ),
+    ("poses p --maker colmap {}", &["--install"], "poses p --maker pycolmap --install"),
     ("locate s --check {}", &["--focal-px 9", "--out t.json"], "locate s a.jpg --focal-px 9 --out t.json"),
     ("export s --html p.html {}", &["--no-measure"], "export s --html p.html --out a.ply --no-measure"),
     ("agent s hi {}", &["--url u", "--model m", "--key-variable k"], "agent s hi --planner llm --url u --model m"),

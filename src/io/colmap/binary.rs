@@ -15,8 +15,8 @@ const CAMERA_BYTES: usize = 4 + 4 + 16 + 16;
 const IMAGE_BYTES: usize = 4 + 56 + 4 + 1 + 8;
 const OBSERVATION_BYTES: usize = 24;
 /// Least bytes of a point: id, position, color, error, length of its track.
-const POINT_BYTES: usize = 8 + 24 + 3 + 8 + 8;
-const TRACK_BYTES: usize = 8;
+pub(super) const POINT_BYTES: usize = 8 + 24 + 3 + 8 + 8;
+pub(super) const TRACK_BYTES: usize = 8;
 
 /// `cameras.bin`.
 pub(super) fn cameras(bytes: &[u8], path: &Path) -> Result<Cameras, IoError> {
@@ -46,7 +46,8 @@ pub(super) fn images(bytes: &[u8], path: &Path) -> Result<Vec<Image>, IoError> {
     let mut ids = Vec::new();
     for i in 0..n {
         let place = format!("image {i}");
-        ids.push(u64::from(r.u32(&place)?));
+        let number = r.u32(&place)?;
+        ids.push(u64::from(number));
         let mut q = [0.0; 4];
         for v in &mut q {
             *v = r.f64(&place)?;
@@ -57,7 +58,7 @@ pub(super) fn images(bytes: &[u8], path: &Path) -> Result<Vec<Image>, IoError> {
             .map_err(|_| IoError::syntax(path, place.clone(), "its name is not UTF-8 text"))?;
         let observations = r.count(&format!("2-D points of {place}"), OBSERVATION_BYTES)?;
         r.take(observations * OBSERVATION_BYTES, &place)?;
-        images.push(Image { name: name.into(), camera, quaternion: q, translation });
+        images.push(Image { number, name: name.into(), camera, quaternion: q, translation });
     }
     distinct(ids, "image", path)?;
     Ok(images)

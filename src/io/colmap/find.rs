@@ -38,7 +38,7 @@ pub(super) struct ModelFolder {
 
 impl ModelFolder {
     /// Returns the reconstruction with files in `folder` itself.
-    fn at(folder: &Path, place: usize) -> Option<Self> {
+    pub(super) fn at(folder: &Path, place: usize) -> Option<Self> {
         let has = |ending: &str| ["cameras", "images"].iter().all(|n| folder.join(format!("{n}.{ending}")).is_file());
         let is_binary = has("bin");
         (is_binary || has("txt")).then(|| Self { folder: folder.into(), is_binary, place })

@@ -7,6 +7,7 @@ mod binary;
 mod find;
 mod lens;
 mod photo_folder;
+pub(crate) mod support;
 mod text;
 
 use std::collections::HashMap;
@@ -25,6 +26,7 @@ pub use binary::{check_cameras, check_images, check_points};
 pub use text::{check_text_cameras, check_text_images, check_text_points};
 
 struct Image {
+    number: u32,
     name: String,
     camera: u32,
     /// camera_from_world, w x y z.
@@ -38,6 +40,12 @@ type Cameras = HashMap<u32, lens::FoundLens>;
 
 pub(crate) fn is_colmap(root: &Path) -> bool {
     find::any(root)
+}
+
+/// Reads the names of the photos in the largest reconstruction of a folder; none if there is none.
+pub(crate) fn photo_names(root: &Path) -> Result<Vec<String>, IoError> {
+    let largest = find::largest(root)?;
+    Ok(largest.into_iter().flat_map(|found| found.images).map(|image| image.name).collect())
 }
 
 /// Reads the dataset in `root`, or the dataset of a reconstruction in `root`.

@@ -83,7 +83,8 @@ pub(super) fn images(text: &str, path: &Path) -> Result<Vec<Image>, IoError> {
             continue;
         }
         let mut l = Line::new(line, i + 1, path);
-        ids.push(u64::from(l.next::<u32>("image id")?));
+        let number = l.next("image id")?;
+        ids.push(u64::from(number));
         let mut quaternion = [0.0; 4];
         for v in &mut quaternion {
             *v = l.next("rotation")?;
@@ -93,7 +94,7 @@ pub(super) fn images(text: &str, path: &Path) -> Result<Vec<Image>, IoError> {
         // A name may hold blanks, so it is the rest of the line.
         let first = l.word("name")?;
         let name = line.get(first.as_ptr() as usize - line.as_ptr() as usize..).unwrap_or(first).trim_end();
-        images.push(Image { name: name.into(), camera, quaternion, translation });
+        images.push(Image { number, name: name.into(), camera, quaternion, translation });
         if let Some((i, line)) = rest.next().filter(|(_, line)| !is_observations(line)) {
             let shown: String = line.chars().take(40).collect();
             return Err(Line::new(line, i + 1, path).bad(format!(

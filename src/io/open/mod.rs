@@ -10,6 +10,7 @@ use std::path::Path;
 use super::gs_output::GsOutput;
 use super::trained::{self, TrainedScene};
 use super::trainings::Training;
+use super::video::footage;
 use super::{
     IoError, OpenError, alpha, colmap, files, gs_output, khr_gltf, ksplat, llff, pixel_masks, results, sog, splat,
     splat_ply, spz, trainings, transforms, unposed,
@@ -244,6 +245,10 @@ fn open_file(path: &Path, axes: Option<Axes>) -> Result<Opened> {
         && let Some(splat) = gs_output::latest(folder)
     {
         return Ok(Opened::Cloud(turned(splat_ply::read(&splat)?, axes)));
+    }
+    if footage::is_video(path) {
+        footage::Footage::open(path, &std::env::var_os("PATH").unwrap_or_default())?;
+        return Err(OpenError::NoPoses(Box::new(unposed::Unposed::of_video(path))));
     }
     let start = files::read_start(path, MAGIC_BYTES)?;
     packed::refuse(path, &name, &start)?;

@@ -40,7 +40,7 @@ impl Ffmpeg {
             .args(["-framerate", &settings.fps.to_string(), "-i", "pipe:0", "-an"])
             .args(usual(&extension, settings))
             .args(args)
-            .arg(output(draft.path()))
+            .arg(plain_file(draft.path()))
             .stdin(Stdio::piped())
             .stdout(Stdio::null())
             .stderr(Stdio::piped());
@@ -136,14 +136,14 @@ fn usual(extension: &str, settings: &VideoSettings) -> Vec<String> {
 }
 
 /// Makes a path that is not taken for an option or a protocol.
-fn output(path: &Path) -> std::ffi::OsString {
-    let mut output = std::ffi::OsString::from("file:");
-    output.push(path);
-    output
+pub(super) fn plain_file(path: &Path) -> std::ffi::OsString {
+    let mut plain = std::ffi::OsString::from("file:");
+    plain.push(path);
+    plain
 }
 
 /// Reads to the end and returns the last lines.
-fn last_lines(words: impl Read) -> String {
+pub(super) fn last_lines(words: impl Read) -> String {
     let mut reader = BufReader::new(words);
     let mut lines = VecDeque::new();
     loop {

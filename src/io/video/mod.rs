@@ -7,6 +7,7 @@
 
 mod error;
 mod ffmpeg;
+pub(crate) mod footage;
 mod format;
 mod frames;
 mod gif;

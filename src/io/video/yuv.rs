@@ -1,4 +1,4 @@
-//! RGB to the planes of video: BT.709, limited range, color at half the size.
+//! RGB to the planes of video and back: BT.709, limited range, color at half the size.
 
 /// The planes of a picture of even sides, each row by row.
 pub(super) struct YuvPlanes {
@@ -58,7 +58,44 @@ impl YuvPlanes {
     }
 }
 
-fn luma([r, g, b]: [f32; 3]) -> f32 {
+/// Planes of a decoded picture, with the bytes of a row of luma and of color.
+#[derive(Clone, Copy)]
+pub(super) struct YuvView<'a> {
+    pub(super) planes: [&'a [u8]; 3],
+    pub(super) rows: [usize; 3],
+    pub(super) size_px: (usize, usize),
+}
+
+impl YuvView<'_> {
+    /// Luma without gaps between rows, 0 to 255 for black to white.
+    pub(super) fn luma(&self) -> Vec<f32> {
+        let (width, height) = self.size_px;
+        let row = |y: usize| self.planes[0].iter().skip(y * self.rows[0]).take(width);
+        (0..height).flat_map(|y| row(y).map(|v| (f32::from(*v) - 16.0) * (255.0 / 219.0))).collect()
+    }
+
+    /// RGB row by row. A pixel takes the color sample of its block.
+    pub(super) fn rgb(&self) -> Vec<u8> {
+        let (width, height) = self.size_px;
+        let at = |plane: usize, x: usize, y: usize| {
+            self.planes[plane].get(y * self.rows[plane] + x).map_or(128.0, |v| f32::from(*v))
+        };
+        let mut rgb = Vec::with_capacity(3 * width * height);
+        for y in 0..height {
+            for x in 0..width {
+                let luma = (at(0, x, y) - 16.0) / 219.0;
+                let color =
+                    |plane: usize, weight: f32| luma + (at(plane, x / 2, y / 2) - 128.0) / 224.0 * (2.0 - 2.0 * weight);
+                let (r, b) = (color(2, RED), color(1, BLUE));
+                let g = (luma - RED * r - BLUE * b) / (1.0 - RED - BLUE);
+                rgb.extend([r, g, b].map(|v| byte(255.0 * v.clamp(0.0, 1.0))));
+            }
+        }
+        rgb
+    }
+}
+
+pub(super) fn luma([r, g, b]: [f32; 3]) -> f32 {
     RED * r + (1.0 - RED - BLUE) * g + BLUE * b
 }
 
@@ -84,6 +121,11 @@ mod tests {
         for (rgb, [y, u, v]) in cases {
             let mut planes = YuvPlanes::new(4, 2);
             planes.fill(&rgb.repeat(8), 4);
+            let view = YuvView { planes: [&planes.y, &planes.u, &planes.v], rows: [4, 2, 2], size_px: (4, 2) };
+            let back = view.rgb();
+            let off = |(a, b): (&u8, u8)| a.abs_diff(b);
+            assert!(back.iter().zip(rgb.repeat(8)).map(off).max() <= Some(2), "{rgb:?} {back:?}");
+            assert!((view.luma()[5] - luma(rgb.map(f32::from))).abs() < 1.0, "{rgb:?}");
             assert_eq!((planes.y, planes.u, planes.v), (vec![y; 8], vec![u; 2], vec![v; 2]), "{rgb:?}");
         }
     }

@@ -1,168 +1,213 @@
-//! Camera poses of photos that have none: COLMAP and GLOMAP, run as separate programs.
+//! Camera poses of photos that have none, by three makers behind one trait: COLMAP as a program, pycolmap in Python, and
+//! the built-in one.
+//!
+//! All write COLMAP's layout, `images` and `sparse/0`, in a folder of their own. Finished steps are noted there
+//! ([`state`]) and not done again.
 
+#[cfg(feature = "sfm")]
+mod built_in;
+mod colmap;
+pub(crate) mod compare;
+pub(crate) mod environment;
+mod findings;
+pub(crate) mod front_door;
+mod maker;
+mod makers;
+pub(crate) mod manual;
 mod process;
+mod pycolmap;
+pub(crate) mod source;
+mod state;
 #[cfg(test)]
 mod tests;
 
-use std::ffi::OsStr;
 use std::fs;
 use std::path::{Path, PathBuf};
 
 use super::{Folders, JobError, export};
 use crate::io::error::write_error;
+use crate::io::folder_lock::FolderLock;
 use crate::io::unposed::Unposed;
-use crate::io::{colmap, photo};
-use crate::pipeline::observer::Observer;
+use crate::io::{self, exif, files, photo};
+use crate::pipeline::observer::{Observer, Severity};
+pub(crate) use findings::FoundPoses;
+pub(crate) use maker::{MakerKind, PoseMaker};
+use state::PoseState;
 
-/// Programs that find camera poses.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub(crate) struct PoseTools {
-    colmap: PathBuf,
-    /// Maps in place of COLMAP, several times faster.
-    glomap: Option<PathBuf>,
+/// Folder of the reconstructions in the folder of poses.
+const SPARSE: &str = "sparse";
+/// Folder of the photos in the folder of poses.
+const IMAGES: &str = "images";
+/// Database of COLMAP in the folder of poses.
+const DATABASE: &str = "database.db";
+/// Share of the photos with a pose, below which a maker tries its next way to map.
+const ENOUGH: f64 = 0.8;
+
+/// Step on the way to camera poses; the result of each is kept.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub(crate) enum MakerStep {
+    /// Finds features in each photo.
+    Features,
+    /// Finds the same features in pairs of photos.
+    Matches,
+    /// Finds poses and points.
+    Mapping,
 }
 
-/// A command to run.
-#[derive(Clone, Debug, PartialEq, Eq)]
-struct PoseStage {
+impl MakerStep {
     /// Its task, for display.
-    title: &'static str,
-    program: PathBuf,
-    args: Vec<String>,
-}
-
-impl PoseTools {
-    /// Returns the installed tools. GLOMAP needs matches of COLMAP, so `None` without that.
-    pub(crate) fn installed() -> Option<Self> {
-        Self::on(&std::env::var_os("PATH").unwrap_or_default())
-    }
-
-    fn on(path: &OsStr) -> Option<Self> {
-        let find = |name: &str| {
-            let places = std::env::split_paths(path).filter(|p| p.is_absolute());
-            let names =
-                if cfg!(windows) { vec![format!("{name}.exe"), format!("{name}.bat")] } else { vec![name.into()] };
-            places.flat_map(|p| names.iter().map(move |n| p.join(n)).collect::<Vec<_>>()).find(|p| p.is_file())
-        };
-        Some(Self { colmap: find("colmap")?, glomap: find("glomap") })
-    }
-
-    /// Their names, for display.
-    pub(crate) fn name(&self) -> &'static str {
-        if self.glomap.is_some() { "COLMAP and GLOMAP" } else { "COLMAP" }
-    }
-
-    /// Returns the commands that compute the poses of photos in `out/images` into `out/sparse`.
-    fn stages(&self, out: &Path, one_camera: bool, gpu: &Gpu) -> Vec<PoseStage> {
-        let at = |name: &str| out.join(name).to_string_lossy().into_owned();
-        let args = |command: &str, pairs: &[(&str, String)]| {
-            let options = pairs.iter().flat_map(|(name, value)| [format!("--{name}"), value.clone()]);
-            std::iter::once(command.to_owned()).chain(options).collect::<Vec<_>>()
-        };
-        let [database, images] = [("database_path", at("database.db")), ("image_path", at("images"))];
-        let mut extraction = vec![database.clone(), images.clone()];
-        let mut matching = vec![database.clone()];
-        if one_camera {
-            extraction.push(("ImageReader.single_camera", "1".into()));
-        }
-        if let Gpu::Off(option) = gpu {
-            extraction.push((option.0, "0".into()));
-            matching.push((option.1, "0".into()));
-        }
-        let mapping = [database, images, ("output_path", at("sparse"))];
-        let colmap = |title, args| PoseStage { title, program: self.colmap.clone(), args };
-        let mapper = PoseStage {
-            title: "Finding camera poses",
-            program: self.glomap.clone().unwrap_or_else(|| self.colmap.clone()),
-            args: args("mapper", &mapping),
-        };
-        vec![
-            colmap("Finding features", args("feature_extractor", &extraction)),
-            colmap("Matching photos", args("exhaustive_matcher", &matching)),
-            mapper,
-        ]
-    }
-}
-
-/// Use of a GPU for features; COLMAP asks for one even in builds without.
-enum Gpu {
-    AsItIs,
-    /// Options of extraction and matching that turn it off; their names depend on the version.
-    Off((&'static str, &'static str)),
-}
-
-impl Gpu {
-    /// Reads it from COLMAP's help texts.
-    fn of(general: &str, extraction: &str) -> Self {
-        match (general.contains("with CUDA"), extraction.contains("--FeatureExtraction.use_gpu")) {
-            (true, _) => Self::AsItIs,
-            (false, true) => Self::Off(("FeatureExtraction.use_gpu", "FeatureMatching.use_gpu")),
-            (false, false) if !extraction.contains("--SiftExtraction.use_gpu") => Self::AsItIs,
-            (false, false) => Self::Off(("SiftExtraction.use_gpu", "SiftMatching.use_gpu")),
+    fn title(self) -> &'static str {
+        match self {
+            Self::Features => "Finding features",
+            Self::Matches => "Matching photos",
+            Self::Mapping => "Finding camera poses",
         }
     }
 }
 
-/// Returns the commands for finding the poses by hand, and for opening the result.
-pub(crate) fn commands(photos: &Unposed) -> Vec<String> {
-    let out = if photos.images == photos.folder {
-        let name = photos.folder.file_name().unwrap_or_default().to_string_lossy().into_owned();
-        photos.folder.with_file_name(format!("{name}-posed"))
-    } else {
-        photos.folder.clone()
-    };
-    let tools = PoseTools { colmap: "colmap".into(), glomap: None };
-    let quoted = |text: &str| {
-        let plain = |c: char| c.is_alphanumeric() || "-_./,:+".contains(c);
-        if !text.is_empty() && text.chars().all(plain) {
-            text.to_owned()
-        } else {
-            format!("'{}'", text.replace('\'', "'\\''"))
-        }
-    };
-    let at = |path: &Path| quoted(&path.to_string_lossy());
-    let mut lines = vec![format!("mkdir -p {}", at(&out.join("sparse")))];
-    if out.join("images") != photos.images {
-        lines.push(format!("cp -r {} {}", at(&photos.images), at(&out.join("images"))));
-    }
-    lines.extend(tools.stages(&out, false, &Gpu::AsItIs).iter().map(|stage| {
-        let words = std::iter::once("colmap".to_owned()).chain(stage.args.iter().map(|a| quoted(a)));
-        words.collect::<Vec<_>>().join(" ")
-    }));
-    lines.push(format!("fmlgs train {}", at(&out)));
-    lines
+/// Work of a maker.
+pub(crate) struct PoseWork<'a> {
+    /// Folder with the photos in `images`.
+    out: &'a Path,
+    /// Names of the photos, in order.
+    photos: &'a [String],
+    /// True if all photos have one size.
+    one_camera: bool,
+    /// True if the photos are frames of a video, in order.
+    is_video: bool,
+    /// Folder for reconstructions, empty at first.
+    sparse: PathBuf,
 }
 
-/// Finds the poses of photos with these tools, in their own folder; returns that. Earlier work there is reused.
+impl PoseWork<'_> {
+    fn at(&self, name: &str) -> PathBuf {
+        self.out.join(name)
+    }
+
+    /// True if neighbors in the list are matched only, not all pairs.
+    fn is_sequential(&self) -> bool {
+        /// Photos up to which all pairs of a video are matched, so that it may come back to where it was.
+        const ALL_PAIRS: usize = 150;
+        self.is_video && self.photos.len() > ALL_PAIRS
+    }
+}
+
+/// Finds the poses of photos with this maker, in `out`. Steps that an earlier call finished there are not done again.
 ///
 /// # Errors
-/// If a tool fails or finds nothing, or the observer asks to stop.
+/// If the maker fails or finds nothing, `out` holds something else, or the observer asks to stop.
 pub(crate) fn find(
     photos: &Unposed,
-    tools: &PoseTools,
-    folders: &Folders,
+    maker: &dyn PoseMaker,
+    out: &Path,
     observer: &mut dyn Observer,
-) -> Result<PathBuf, JobError> {
-    let out = folders.poses(&photos.folder);
-    export::make_folder(&out.join("sparse"))?;
-    export::make_folder(&out.join("images"))?;
-    let mut sizes = Vec::new();
+) -> Result<FoundPoses, JobError> {
+    check_out(photos, out)?;
+    export::make_folder(out)?;
+    let _lock = FolderLock::take(out, "camera poses")?;
+    let mut state = PoseState::resume(photos, maker, out)?;
+    if let Some(found) = state.found.take() {
+        return Ok(found);
+    }
+    let one_camera = gather(photos, out, observer)?;
+    let (sparse, part) = (out.join(SPARSE), out.join("sparse.part"));
+    let work =
+        PoseWork { out, photos: &photos.photos, one_camera, is_video: photos.video.is_some(), sparse: part.clone() };
+    for &step in maker.steps() {
+        if state.done.contains(&step) {
+            continue;
+        }
+        if step == MakerStep::Mapping {
+            remove(&part)?;
+            export::make_folder(&part)?;
+        }
+        maker.run(step, &work, observer)?;
+        if step == MakerStep::Mapping {
+            largest_first(&part)?;
+            if !io::colmap::is_colmap(&part) {
+                return Err(JobError::NoPosesFound(photos.folder.clone()));
+            }
+            remove(&sparse)?;
+            fs::rename(&part, &sparse).map_err(|e| write_error(&sparse, e))?;
+        }
+        state.finish(step, out)?;
+    }
+    let found = findings::of(photos, maker, out, observer)?;
+    state.found = Some(found.clone());
+    state.write(out)?;
+    Ok(found)
+}
+
+/// Folder for the poses of photos that are given no other.
+pub(crate) fn usual_out(photos: &Unposed, folders: &Folders) -> PathBuf {
+    folders.poses(photos.video.as_deref().unwrap_or(&photos.folder))
+}
+
+/// Refuses a folder that holds something else than poses of these photos.
+fn check_out(photos: &Unposed, out: &Path) -> Result<(), JobError> {
+    let real = files::real(out);
+    if real == files::real(&photos.folder) || real.join(IMAGES) == files::real(&photos.images) {
+        return Err(JobError::Output(format!(
+            "'{}' is the folder of the photos themselves; choose another one for their poses",
+            out.display()
+        )));
+    }
+    if files::holds_something(out) && !PoseState::is_in(out) && !is_earlier(out) {
+        return Err(JobError::Output(format!(
+            "'{}' holds something else than camera poses that this program found; choose another folder",
+            out.display()
+        )));
+    }
+    Ok(())
+}
+
+/// True if an earlier version of this program left its work in a folder.
+fn is_earlier(out: &Path) -> bool {
+    let ours = [DATABASE, SPARSE, IMAGES];
+    let of_lock = |name: &String| name.starts_with('.');
+    files::names_in(out).is_ok_and(|names| names.iter().all(|n| ours.contains(&n.as_str()) || of_lock(n)))
+        && out.join(DATABASE).is_file()
+}
+
+/// Puts the photos into `out/images`; returns true if all have one size.
+fn gather(photos: &Unposed, out: &Path, observer: &mut dyn Observer) -> Result<bool, JobError> {
+    let images = out.join(IMAGES);
+    export::make_folder(&images)?;
+    let (mut sizes, mut absurd) = (Vec::new(), Vec::new());
     for name in &photos.photos {
-        let (from, to) = (photos.images.join(name), out.join("images").join(name));
-        sizes.push(photo::size(&from)?);
-        if !to.exists() {
+        let (from, to) = (photos.images.join(name), images.join(name));
+        let size = photo::size(&from)?;
+        sizes.push(size);
+        let is_absurd = matches!(exif::focal(&from, size), Ok(exif::ExifFocal::Absurd(_)));
+        absurd.extend(is_absurd.then(|| name.clone()));
+        if to.exists() {
+            continue;
+        }
+        if is_absurd {
+            // Makers would believe it.
+            let bytes = files::read(&from, files::MAX_PICTURE_BYTES)?;
+            io::atomic::write(&to, |w| w.write_all(&exif::without(&bytes)))?;
+        } else {
             // A hard link on the same disk, so that nothing outside the folder is needed.
             fs::hard_link(&from, &to).or_else(|_| fs::copy(&from, &to).map(drop)).map_err(|e| write_error(&to, e))?;
         }
     }
-    let one_camera = sizes.windows(2).all(|s| s[0] == s[1]);
-    let help = |args: &[&str]| process::output(&tools.colmap, args);
-    let gpu = Gpu::of(&help(&["help"]), &help(&["feature_extractor", "-h"]));
-    for stage in tools.stages(&out, one_camera, &gpu) {
-        process::run(&stage, photos.photos.len(), observer)?;
+    if let Some(first) = absurd.first() {
+        let n = absurd.len();
+        let text = format!("{n} photos (first: {first}) state a focal length that no lens has; it is not used");
+        observer.note(Severity::Warning, text);
     }
-    largest_first(&out.join("sparse"))?;
-    if colmap::is_colmap(&out) { Ok(out) } else { Err(JobError::NoPosesFound(photos.folder.clone())) }
+    Ok(sizes.windows(2).all(|s| s[0] == s[1]))
+}
+
+/// Removes a folder or file of this program, if it is there.
+fn remove(path: &Path) -> Result<(), JobError> {
+    let gone = if path.is_dir() { fs::remove_dir_all(path) } else { fs::remove_file(path) };
+    match gone {
+        Err(e) if e.kind() != std::io::ErrorKind::NotFound => Err(write_error(path, e).into()),
+        _ => Ok(()),
+    }
 }
 
 /// Makes the reconstruction of most photos `0`: photos without overlap become several reconstructions.

@@ -4,13 +4,12 @@
 
 use std::collections::VecDeque;
 use std::io::{BufRead, BufReader, Read};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::time::Duration;
 
 use crossbeam_channel::{RecvTimeoutError, Sender, bounded};
 
-use super::PoseStage;
 use crate::jobs::JobError;
 use crate::pipeline::observer::{Observer, Ticker};
 
@@ -20,6 +19,15 @@ const LAST_LINES: usize = 8;
 const LINE_BYTES: u64 = 2_000;
 /// Time between checks of the observer while the program prints nothing.
 const PATIENCE: Duration = Duration::from_millis(100);
+
+/// A command to run.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) struct PoseStage {
+    /// Its task, for display.
+    pub(super) title: &'static str,
+    pub(super) program: PathBuf,
+    pub(super) args: Vec<String>,
+}
 
 /// A running program, killed when this is dropped.
 struct Running(Child);
@@ -93,6 +101,8 @@ fn quiet(program: &Path) -> Command {
     let mut command = Command::new(program);
     // Without a display, COLMAP's use of Qt would end it.
     command.env("QT_QPA_PLATFORM", "offscreen");
+    // Python imports nothing from the folder that the user happens to be in.
+    command.env("PYTHONSAFEPATH", "1");
     #[cfg(target_os = "linux")]
     {
         use std::os::unix::process::CommandExt;
@@ -142,7 +152,11 @@ pub(super) fn progress(line: &str, photos: usize, registered: &mut u64) -> Optio
     let share = match pairs.as_slice() {
         [(done, all)] => done / all,
         // Rows of blocks, each with its columns.
-        [(row, rows), (column, columns)] => (row - 1.0 + column / columns) / rows,
+        [(row, rows), (column, columns)] => {
+            // COLMAP 4 says so before a block, earlier versions after it.
+            let column = column - f64::from(u8::from(line.contains("Processing")));
+            (row - 1.0 + column / columns) / rows
+        }
         _ => return None,
     };
     Some((share.clamp(0.0, 1.0) * photos as f64).round() as u64)

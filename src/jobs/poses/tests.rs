@@ -2,8 +2,13 @@
 
 #![cfg(unix)]
 
+mod video;
+
 use std::os::unix::fs::PermissionsExt;
 
+use super::front_door::{PoseRequest, find_in};
+use super::maker::MakerPlaces;
+use super::makers::choose;
 use super::process::progress;
 use super::*;
 use crate::io::OpenError;
@@ -64,8 +69,9 @@ impl Fake {
 
     fn find(&self, observer: &mut dyn Observer) -> Result<PathBuf, JobError> {
         let here = self.guard.path();
-        let tools = PoseTools::on(here.as_os_str()).expect("it is on the path");
-        find(&self.photos, &tools, &Folders { data: here.join("data") }, observer)
+        let request = PoseRequest { photos: self.photos.clone(), ..PoseRequest::default() };
+        let places = MakerPlaces { path: here.into(), ..MakerPlaces::default() };
+        Ok(find_in(&request, &places, &Folders { data: here.join("data") }, observer)?.out)
     }
 
     fn asked(&self) -> String {
@@ -134,7 +140,9 @@ fn lines_are_read_as_progress() {
     let mut of = |line: &str| progress(line, 100, &mut registered);
     assert_eq!(of("I0101 features.cc:1] Processed file [25/100]"), Some(25));
     assert_eq!(of("Matching block [1/2, 1/2] in 3s"), Some(25));
-    assert_eq!(of("Processing block [2/2, 2/2]"), Some(100));
+    assert_eq!(of("Matching block [2/2, 2/2] in 3s"), Some(100));
+    assert_eq!(of("Processing block [2/2, 2/2]"), Some(75));
+    assert_eq!(of("Processing block [1/1, 1/1]"), Some(0));
     assert_eq!(of("Registering image #17 (3)"), Some(1));
     assert_eq!(of("Registering image #18 (num_reg_frames=4)"), Some(2));
     for other in ["Bundle adjustment report", "Processed file [x/y]", "Processed file [1/0]", "Matching block [1"] {
@@ -145,15 +153,83 @@ fn lines_are_read_as_progress() {
 #[test]
 fn the_commands_can_be_copied_into_a_shell() {
     let photos = Unposed { folder: "/a b/it's".into(), images: "/a b/it's".into(), ..Unposed::default() };
-    let lines = commands(&photos);
+    let lines = manual::commands(&photos);
     assert_eq!(lines[1], r"cp -r '/a b/it'\''s' '/a b/it'\''s-posed/images'");
     assert_eq!(lines.last().map(String::as_str), Some(r"fmlgs train '/a b/it'\''s-posed'"));
     let tidy = Unposed { folder: "/data/fox".into(), images: "/data/fox/images".into(), ..Unposed::default() };
-    let lines = commands(&tidy);
+    let lines = manual::commands(&tidy);
     assert_eq!(lines.len(), 5, "nothing is copied: {lines:?}");
     assert_eq!(
         lines[3],
         "colmap mapper --database_path /data/fox/database.db --image_path /data/fox/images --output_path /data/fox/sparse"
     );
-    assert_eq!(PoseTools::on(OsStr::new("/no/such/place")), None, "without the program it is not offered");
+    let nowhere = MakerPlaces { path: "/no/such/place".into(), ..MakerPlaces::default() };
+    let missing = choose(Some(MakerKind::Colmap), &nowhere).err().map(|e| e.to_string()).unwrap_or_default();
+    assert!(missing.contains("'colmap' is not found on the PATH"), "{missing}");
+}
+
+#[test]
+fn finished_steps_are_not_done_again() {
+    // Matching fails until it may go on.
+    let fake = Fake::new("test -e \"$(dirname \"$0\")/go on\"");
+    fake.find(&mut Silent).expect_err("it fails");
+    let count = |word: &str| fake.asked().lines().filter(|l| l.starts_with(word) && !l.ends_with("-h")).count();
+    assert_eq!((count("feature_extractor"), count("exhaustive_matcher"), count("mapper")), (1, 1, 0));
+    fs::write(fake.guard.path().join("go on"), "").expect("written");
+    let first = fake.find(&mut Silent).expect("found");
+    assert_eq!((count("feature_extractor"), count("exhaustive_matcher"), count("mapper")), (1, 2, 1));
+    assert_eq!(fake.find(&mut Silent).expect("known"), first);
+    assert_eq!(count("mapper"), 1, "all is known");
+    // Another photo: all is done anew.
+    fs::copy(fake.photos.images.join("0.png"), fake.photos.images.join("1.png")).expect("copied");
+    fake.find(&mut Silent).expect("found");
+    assert_eq!((count("feature_extractor"), count("mapper")), (2, 2));
+}
+
+#[test]
+fn a_new_colmap_maps_globally_and_again_where_few_photos_get_a_pose() {
+    let fake = Fake::new("true");
+    let program = fake.guard.path().join("colmap");
+    let script = fs::read_to_string(&program).expect("read");
+    let new = script.replace("COLMAP 3.8 (without CUDA)", "COLMAP 4.1 (with CUDA) global_mapper mapper");
+    // Its global mapper finds one photo of three.
+    let few = new.replace("mapper)\n", "global_mapper) mkdir -p \"$7/0\" ;;\nmapper)\n");
+    fs::write(&program, few).expect("written");
+    fake.find(&mut Silent).expect("found");
+    let asked = fake.asked();
+    let [global, mapper] = ["\nglobal_mapper --database_path", "\nmapper --database_path"].map(|w| asked.find(w));
+    assert!(global.is_some() && global < mapper, "{asked}");
+    assert!(!asked.contains("use_gpu"), "a GPU is used as it is");
+    // The control: enough photos at once.
+    let fake = Fake::new("true");
+    let new = fs::read_to_string(fake.guard.path().join("colmap")).expect("read");
+    let new = new.replace("COLMAP 3.8 (without CUDA)", "global_mapper").replace("mapper)\n", "global_mapper)\n");
+    fs::write(fake.guard.path().join("colmap"), new).expect("written");
+    fake.find(&mut Silent).expect("found");
+    assert!(!fake.asked().contains("\nmapper"), "{}", fake.asked());
+}
+
+#[test]
+fn lost_photos_are_told_with_the_reason_and_a_strangers_folder_is_left_alone() {
+    let fake = Fake::new("true");
+    // A fourth photo, of which the reconstruction knows nothing: plain, so there is nothing to see.
+    fs::copy(fake.photos.images.join("0.png"), fake.photos.images.join("lost.png")).expect("copied");
+    let Err(OpenError::NoPoses(photos)) = crate::io::open(&fake.photos.images) else { panic!("no poses") };
+    let out = fake.guard.path().join("out");
+    let request = PoseRequest { photos: *photos, out: Some(out.clone()), ..PoseRequest::default() };
+    let places = MakerPlaces { path: fake.guard.path().into(), ..MakerPlaces::default() };
+    let folders = Folders { data: fake.guard.path().join("data") };
+    let find = |request: &PoseRequest| find_in(request, &places, &folders, &mut Silent);
+    let found = find(&request).expect("found");
+    assert_eq!((found.registered, found.photos, found.missing.len()), (3, 4, 1), "{found:?}");
+    assert!(found.missing[0].photo == "lost.png" && found.missing[0].why.contains("almost nothing"), "{found:?}");
+    assert!(found.summary().contains("3 of 4 photos have a pose"), "{}", found.summary());
+    let full = fake.guard.path().join("full");
+    fs::create_dir(&full).and_then(|()| fs::write(full.join("diary.txt"), "mine")).expect("prepared");
+    for (out, part) in [(&full, "something else"), (&fake.photos.images, "the folder of the photos themselves")] {
+        let refused = PoseRequest { out: Some(out.clone()), ..request.clone() };
+        let text = find(&refused).expect_err("refused").to_string();
+        assert!(text.contains(part), "{text}");
+    }
+    assert_eq!(fs::read_to_string(full.join("diary.txt")).expect("read"), "mine");
 }

@@ -3,8 +3,8 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use crate::io::unposed::Unposed;
 use crate::jobs::demo::QUESTION;
+use crate::jobs::poses::front_door::PoseRequest;
 use crate::jobs::workspace::OpenedPath;
 use crate::jobs::{JobError, OpenedScene, phases, presets};
 use crate::measure::{Report, is_report};
@@ -20,9 +20,9 @@ use crate::ui::state::{AppState, ShownReport, Tone};
 use crate::worker::{Failure, JobInfo, Makes};
 
 /// File endings of scenes.
-const SCENES: [&str; 18] = [
+const SCENES: [&str; 21] = [
     ".ply", ".splat", ".ksplat", ".spz", ".sog", ".gltf", ".glb", ".json", ".toml", ".npy", ".bin", ".txt", ".zip",
-    ".pth", ".pt", ".ckpt", ".yml", ".npz",
+    ".pth", ".pt", ".ckpt", ".yml", ".npz", ".mp4", ".mov", ".m4v",
 ];
 
 pub(in crate::ui) fn choose_folder(app: &mut App) {
@@ -62,7 +62,7 @@ pub(in crate::ui) fn open(app: &mut App, path: PathBuf) {
                     app.layout.split_view &= app.state.beside.is_empty();
                     app.state.opened(*scene, false);
                 }
-                OpenedPath::Unposed(photos) => app.state.unposed = Some(photos),
+                OpenedPath::Unposed(question) => app.state.unposed = Some(question),
             },
         );
     });
@@ -73,15 +73,15 @@ fn is_same_place(state: &AppState, now: &OpenedScene) -> bool {
     state.is_trained() && now.trained && state.scene.as_ref().is_some_and(|before| before.has_photos_of(now))
 }
 
-/// Finds the camera poses of photos, and opens the result.
-pub(in crate::ui) fn find_poses(app: &mut App, photos: Box<Unposed>) {
-    let title = format!("Finding camera poses of {}", file_name(&photos.folder));
+/// Finds the camera poses of photos or a video, and opens the result.
+pub(in crate::ui) fn find_poses(app: &mut App, request: Box<PoseRequest>) {
+    let title = format!("Finding camera poses of {}", file_name(&request.photos.folder));
     let info = JobInfo::long(title).makes(Makes::Scene).phases(phases::POSES);
     let workspace = Arc::clone(&app.workspace);
     open_by(
         app,
         info,
-        move |observer| workspace.find_poses(&photos, observer),
+        move |observer| workspace.find_poses(&request, observer),
         |app, scene| {
             app.state.opened(scene, false);
         },

@@ -7,7 +7,7 @@ use glam::{DVec2, DVec3};
 use serde::{Deserialize, Serialize};
 use strum::{IntoStaticStr, VariantArray};
 
-use crate::io::unposed::Unposed;
+use crate::jobs::poses::front_door::PoseRequest;
 use crate::jobs::remove::RemoveRequest;
 use crate::measure::{Knobs, StageName};
 use crate::navigate::target::Side;

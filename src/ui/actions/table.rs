@@ -14,8 +14,8 @@ macro_rules! action_table {
                 => open::choose_file(app);
             Open(path: PathBuf): format!("Open {}", path.display()), "Open this path." => open::open(app, path);
             OpenLast: "Open the last scene", "The scene or data set that was open most recently." => runs::open_last(app);
-            FindPoses(photos: Box<Unposed>): format!("Find the camera poses of {}", photos.folder.display()),
-                "Run COLMAP on the photos, in a folder of its own, and open the result." => open::find_poses(app, photos);
+            FindPoses(request: Box<PoseRequest>): format!("Find the camera poses of {}", request.photos.folder.display()),
+                "Find them in a folder of their own, and open the result." => open::find_poses(app, request);
             Connect(url: String): "Connect to another computer",
                 "Look at what 'fmlgs serve' or 'fmlgs train --serve' shows there." => remote::connect(app, &url);
             OpenDemo: "Open the demo", "A trained tabletop with objects and parts, ready for queries. No download needed."

@@ -11,9 +11,9 @@ use super::comparison::ComparedScene;
 use super::history::ChangeHistory;
 use super::labels::{PhraseTable, ScreenNames};
 pub(crate) use super::train_history::TrainHistory;
-use crate::io::unposed::Unposed;
 use crate::jobs::go_to::Explored;
 use crate::jobs::models::ModelList;
+use crate::jobs::poses::front_door::PoseQuestion;
 use crate::jobs::rearrange::RearrangedScene;
 use crate::jobs::recent::RecentScene;
 use crate::jobs::remove::StoredRemoval;
@@ -93,8 +93,8 @@ pub struct AppState {
     pub(crate) toasts: Vec<Toast>,
     /// The error on screen.
     pub error: Option<ErrorBox>,
-    /// Opened photos without camera poses, until the user has decided on them.
-    pub(crate) unposed: Option<Box<Unposed>>,
+    /// Opened photos or a video without camera poses, until the user has decided on them.
+    pub(crate) unposed: Option<Box<PoseQuestion>>,
     /// Recently opened files and folders, newest first.
     pub recent: Vec<PathBuf>,
     /// What is known of them, once it is read.

@@ -1,0 +1,159 @@
+//! COLMAP as a program. Its own global mapper (since version 4) is taken, else GLOMAP, else the incremental one.
+
+use std::path::{Path, PathBuf};
+
+use super::maker::{MakerKind, MakerPlaces, PoseMaker};
+use super::process::{self, PoseStage};
+use super::{DATABASE, ENOUGH, IMAGES, MakerStep, PoseWork, SPARSE, findings::registered};
+use crate::jobs::{JobError, export};
+use crate::pipeline::observer::Observer;
+
+/// Programs of COLMAP.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) struct Colmap {
+    pub(super) colmap: PathBuf,
+    /// Maps in place of an older COLMAP, several times faster.
+    pub(super) glomap: Option<PathBuf>,
+}
+
+/// Use of a GPU for features; COLMAP asks for one even in builds without.
+pub(super) enum Gpu {
+    AsItIs,
+    /// Options of extraction and matching that turn it off; their names depend on the version.
+    Off((&'static str, &'static str)),
+}
+
+impl Gpu {
+    /// Reads it from COLMAP's help texts.
+    fn of(general: &str, extraction: &str) -> Self {
+        match (general.contains("with CUDA"), extraction.contains("--FeatureExtraction.use_gpu")) {
+            (true, _) => Self::AsItIs,
+            (false, true) => Self::Off(("FeatureExtraction.use_gpu", "FeatureMatching.use_gpu")),
+            (false, false) if !extraction.contains("--SiftExtraction.use_gpu") => Self::AsItIs,
+            (false, false) => Self::Off(("SiftExtraction.use_gpu", "SiftMatching.use_gpu")),
+        }
+    }
+}
+
+impl Colmap {
+    /// Finds it; GLOMAP needs its matches, so `None` without it.
+    pub(super) fn at(places: &MakerPlaces) -> Option<Self> {
+        Some(Self { colmap: places.program("colmap")?, glomap: places.program("glomap") })
+    }
+
+    fn stage(&self, step: MakerStep, args: Vec<String>) -> PoseStage {
+        PoseStage { title: step.title(), program: self.colmap.clone(), args }
+    }
+
+    /// Command that finds features, or matches them.
+    pub(super) fn features(&self, step: MakerStep, work: &PoseWork<'_>, gpu: &Gpu) -> PoseStage {
+        let is_extraction = step == MakerStep::Features;
+        let mut options = vec![("database_path", text(&work.at(DATABASE)))];
+        if is_extraction {
+            options.push(("image_path", text(&work.at(IMAGES))));
+            if work.one_camera {
+                options.push(("ImageReader.single_camera", "1".into()));
+            }
+        } else if work.is_sequential() {
+            options.push(("SequentialMatching.overlap", "15".into()));
+        }
+        if let Gpu::Off((extraction, matching)) = gpu {
+            options.push((if is_extraction { *extraction } else { *matching }, "0".into()));
+        }
+        let command = match (is_extraction, work.is_sequential()) {
+            (true, _) => "feature_extractor",
+            (false, true) => "sequential_matcher",
+            (false, false) => "exhaustive_matcher",
+        };
+        self.stage(step, args(command, &options))
+    }
+
+    /// Command that finds poses, with this command of COLMAP, or with GLOMAP.
+    pub(super) fn mapping(&self, command: &str, with_glomap: bool, work: &PoseWork<'_>, sparse: &Path) -> PoseStage {
+        let options = [
+            ("database_path", text(&work.at(DATABASE))),
+            ("image_path", text(&work.at(IMAGES))),
+            ("output_path", text(sparse)),
+        ];
+        let mut stage = self.stage(MakerStep::Mapping, args(command, &options));
+        if let Some(glomap) = self.glomap.as_ref().filter(|_| with_glomap) {
+            stage.program.clone_from(glomap);
+        }
+        stage
+    }
+
+    /// Maps the fast way, and by the incremental mapper too if few photos got a pose; the result of most photos stays.
+    fn map(&self, general: &str, work: &PoseWork<'_>, observer: &mut dyn Observer) -> Result<(), JobError> {
+        let has_global = general.split_whitespace().any(|word| word == "global_mapper");
+        let fast = match (has_global, &self.glomap) {
+            (true, _) => Some(("global_mapper", false)),
+            (false, Some(_)) => Some(("mapper", true)),
+            (false, None) => None,
+        };
+        let Some((command, with_glomap)) = fast else {
+            return process::run(&self.mapping("mapper", false, work, &work.sparse), work.photos.len(), observer);
+        };
+        let first = process::run(&self.mapping(command, with_glomap, work, &work.sparse), work.photos.len(), observer);
+        if first.as_ref().is_err_and(JobError::is_cancelled) {
+            return first;
+        }
+        if first.is_ok() && registered(&work.sparse) as f64 >= ENOUGH * work.photos.len() as f64 {
+            return Ok(());
+        }
+        let second = work.sparse.with_extension("second");
+        super::remove(&second)?;
+        export::make_folder(&second)?;
+        let other = process::run(&self.mapping("mapper", false, work, &second), work.photos.len(), observer);
+        if other.is_ok() && registered(&second) > registered(&work.sparse) {
+            super::remove(&work.sparse)?;
+            std::fs::rename(&second, &work.sparse).map_err(|e| crate::io::error::write_error(&work.sparse, e))?;
+        }
+        super::remove(&second)?;
+        if registered(&work.sparse) > 0 { Ok(()) } else { first.and(other) }
+    }
+}
+
+impl PoseMaker for Colmap {
+    fn kind(&self) -> MakerKind {
+        MakerKind::Colmap
+    }
+
+    fn name(&self) -> String {
+        if self.glomap.is_some() { "COLMAP and GLOMAP" } else { "COLMAP" }.into()
+    }
+
+    fn run(&self, step: MakerStep, work: &PoseWork<'_>, observer: &mut dyn Observer) -> Result<(), JobError> {
+        let help = |args: &[&str]| process::output(&self.colmap, args);
+        let general = help(&["help"]);
+        match step {
+            MakerStep::Mapping => self.map(&general, work, observer),
+            _ => {
+                let gpu = Gpu::of(&general, &help(&["feature_extractor", "-h"]));
+                process::run(&self.features(step, work, &gpu), work.photos.len(), observer)
+            }
+        }
+    }
+}
+
+/// Commands for finding the poses of photos in `out/images` by hand, as words.
+pub(super) fn by_hand(out: &Path) -> Vec<Vec<String>> {
+    let tools = Colmap { colmap: "colmap".into(), glomap: None };
+    let sparse = out.join(SPARSE);
+    let work = PoseWork { out, photos: &[], one_camera: false, is_video: false, sparse: sparse.clone() };
+    let gpu = Gpu::AsItIs;
+    let stages = [
+        tools.features(MakerStep::Features, &work, &gpu),
+        tools.features(MakerStep::Matches, &work, &gpu),
+        tools.mapping("mapper", false, &work, &sparse),
+    ];
+    stages.into_iter().map(|stage| std::iter::once("colmap".to_owned()).chain(stage.args).collect()).collect()
+}
+
+fn text(path: &Path) -> String {
+    path.to_string_lossy().into_owned()
+}
+
+fn args(command: &str, pairs: &[(&str, String)]) -> Vec<String> {
+    let options = pairs.iter().flat_map(|(name, value)| [format!("--{name}"), value.clone()]);
+    std::iter::once(command.to_owned()).chain(options).collect()
+}
