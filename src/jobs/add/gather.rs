@@ -102,8 +102,13 @@ pub(super) fn gather(
         }
     }
     let (known, unposed): (Vec<PathBuf>, Vec<PathBuf>) = unposed.into_iter().partition(|path| is_own(dataset, path));
+    let known_count = known.len();
     let reason = || "the scene has it already".to_owned();
     all.refused.extend(known.into_iter().map(|photo| RefusedPhoto { photo, reason: reason() }));
+    if focal_px.is_some() && unposed.is_empty() && known_count == 0 {
+        let text = "a focal length has no use here: all of these photos have poses; leave it out";
+        return Err(JobError::Output(text.into()));
+    }
     if !unposed.is_empty() {
         let options = LocateOptions { focal_px, finest_px: DEFAULT_PX, dataset: Some(dataset.source().into()) };
         let (_, found) = locate::run(scene, &unposed, &options, observer)?;

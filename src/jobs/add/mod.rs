@@ -85,6 +85,9 @@ pub(crate) fn run(
     let folder = scene.folder.as_deref().ok_or_else(|| JobError::NoScene(scene.path.clone()))?;
     let request = request(scene, paths, options);
     check(scene, folder, &request, out)?;
+    if (options.masks.is_some() || options.segmenter.is_some()) && scene.known_semantics()?.is_none() {
+        return Err(JobError::NoObjects(scene.path.clone()));
+    }
     let photos = out.join(PHOTOS);
     let mut refused = Vec::new();
     if !is_begun(&request, out) {

@@ -139,6 +139,12 @@ fn bad_photos_leave_nothing_behind() {
         assert!(error.contains("no photo is left to add") && error.contains(name), "{error}");
         assert!(!at("out").exists(), "{name}");
     }
+    let focal = AddOptions { focal_px: Some(50.0), ..AddOptions::default() };
+    let error = run(&scene, &[at("near")], &focal, &at("out"), &mut Silent).expect_err("posed").to_string();
+    assert!(error.contains("have poses"), "{error}");
+    let masks = AddOptions { segmenter: Some("regions".into()), ..AddOptions::default() };
+    let error = run(&scene, &[at("near")], &masks, &at("out"), &mut Silent).expect_err("no objects").to_string();
+    assert!(error.contains("no objects") && !at("out").exists(), "{error}");
     // Posed in another frame: looks like nothing there.
     photos(&at("elsewhere"), &[camera(0.0, 1.6), camera(0.2, 1.6)], &[]);
     let text = std::fs::read_to_string(at("elsewhere/transforms.json")).expect("read");
