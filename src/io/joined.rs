@@ -5,7 +5,6 @@
 //! it, in the frame of the data set.
 
 use std::collections::BTreeSet;
-use std::io::Write;
 use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
@@ -21,7 +20,7 @@ const VERSION: u64 = 1;
 /// Contents of the list.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub(crate) struct JoinedPhotos {
-    version: u64,
+    pub(crate) version: u64,
     #[serde(default, deserialize_with = "text::read_name")]
     pub(crate) name: String,
     /// Path of the data set, from the list's folder where it can be.
