@@ -27,9 +27,11 @@ const OLD_PER_NEW: usize = 8;
 const OLD_AT_LEAST: usize = 24;
 /// Most turns of an added photo in a round.
 const MOST_TURNS: usize = 8;
-/// Gaussians for each pixel that active ones fill, and least growth of their number.
-const PER_PIXEL: f64 = 0.5;
+/// Most Gaussians for each pixel that active ones fill, and least growth of their number.
+const MOST_PER_PIXEL: f64 = 0.5;
 const LEAST_GROWTH: f64 = 0.25;
+/// Steps on old photos for each on an added one: the old photos are many, and must not get worse.
+const OLD_STEPS: usize = 2;
 
 /// What is refined, for the report.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
@@ -99,10 +101,10 @@ pub(super) fn begin(
     let cameras: Vec<_> = old.iter().map(|v| &v.camera).collect();
     let shares = active::shares(&cloud, &active.is, &cameras, &settings, observer)?;
     let beside = beside(&shares, photos.len());
-    let turns = beside.len().div_ceil(photos.len()).clamp(1, MOST_TURNS) as u32;
+    let turns = beside.len().div_ceil(OLD_STEPS * photos.len()).clamp(1, MOST_TURNS) as u32;
     photos.iter_mut().for_each(|p| p.turns = turns);
     photos.extend(beside.iter().map(|&i| RefiningPhoto { name: old[i].name.clone(), turns: 1, gain: [1.0; 3] }));
-    let most = most_gaussians(&active, cloud.len());
+    let most = most_gaussians(&active, cloud.len(), before.pixels());
     let text = format!(
         "{} of {} Gaussians are refined, by {} and {} that show them; the others stay",
         count(active.count() as u64),
@@ -127,10 +129,12 @@ fn beside(shares: &[f64], added: usize) -> Vec<usize> {
     all
 }
 
-/// Returns the budget: as many more Gaussians as the pixels of the close-ups need.
-fn most_gaussians(active: &ActiveGaussians, before: usize) -> usize {
+/// Returns the budget: as many Gaussians for a pixel of the close-ups as there were for one of the old photos, of which
+/// all Gaussians fill so many.
+fn most_gaussians(active: &ActiveGaussians, before: usize, old_pixels: f64) -> usize {
     let now = active.count() as f64;
-    let growth = (PER_PIXEL * active.pixels - now).max(LEAST_GROWTH * now);
+    let per_pixel = (before as f64 / old_pixels.max(1.0)).min(MOST_PER_PIXEL);
+    let growth = (per_pixel * active.pixels - now).max(LEAST_GROWTH * now);
     (before + growth as usize).min(budget::gaussians().max(before))
 }
 
@@ -145,7 +149,8 @@ mod tests {
         assert_eq!(beside(&many, 1).len(), OLD_AT_LEAST);
         assert_eq!(beside(&many, 5), (60..100).collect::<Vec<_>>());
         let active = |n: usize, pixels: f64| ActiveGaussians { is: vec![true; n], pixels };
-        assert_eq!(most_gaussians(&active(100, 1_000.0), 300), 700);
-        assert_eq!(most_gaussians(&active(100, 10.0), 300), 325);
+        assert_eq!(most_gaussians(&active(100, 1_000.0), 300, 300.0), 700, "half a pixel each at least");
+        assert_eq!(most_gaussians(&active(100, 1_000.0), 300, 1_500.0), 400);
+        assert_eq!(most_gaussians(&active(100, 10.0), 300, 300.0), 325);
     }
 }

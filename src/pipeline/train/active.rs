@@ -73,6 +73,11 @@ impl ShownGaussians {
         Self { rate: vec![0.0; n], weight: vec![0.0; n], error: vec![0.0; n], most: vec![0.0; n] }
     }
 
+    /// Returns each Gaussian's pixels in the photo that shows it largest, added up.
+    pub(crate) fn pixels(&self) -> f64 {
+        self.most.iter().map(|px| f64::from(*px)).sum()
+    }
+
     fn mean_error(&self, i: usize) -> f32 {
         if self.weight[i] > 0.0 { self.error[i] / self.weight[i] } else { 0.0 }
     }

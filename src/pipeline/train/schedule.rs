@@ -59,7 +59,7 @@ impl Schedule {
             from,
             sh_interval: 0,
             densify_from: from + densify_interval,
-            densify_until: from + n * 3 / 5,
+            densify_until: from + n * 2 / 5,
             densify_interval,
             reset_interval: u64::MAX,
             ..Self::new(config, extent)
@@ -143,7 +143,7 @@ mod tests {
         assert_eq!(s.sh_degree(7_000), 3);
         assert!(!(7_000..=7_900).any(|done| s.resets(done)));
         let rounds: Vec<u64> = (7_000..=7_900).filter(|done| s.densifies(*done)).collect();
-        assert!(rounds.len() >= 10 && rounds.last().is_some_and(|last| *last <= 7_540), "{rounds:?}");
+        assert!(rounds.len() >= 10 && rounds.last().is_some_and(|last| *last <= 7_360), "{rounds:?}");
         assert!(rounds.iter().zip((1..=rounds.len() as u64).rev()).all(|(done, left)| s.rounds_left(*done) == left));
         let first_step = |s: &Schedule, step| s.adam(step).first_correction;
         assert_eq!(first_step(&s, 7_000), first_step(&schedule(7_000), 0), "its moments begin at zero");
