@@ -22,8 +22,9 @@ struct AdamStep {
     growth: f32,
     // A gradient this many times too large is counted.
     outlier: f32,
+    // Floats at the front that stay as they are.
+    frozen: u32,
     pad0: f32,
-    pad1: f32,
 }
 
 @group(0) @binding(0) var<uniform> adam: AdamStep;
@@ -45,7 +46,7 @@ const MARK: u32 = 11u;
 fn main(@builtin(global_invocation_id) global: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>) {
     let i = flat(global, groups, 256u);
     // A frame whose pairs did not fit was not drawn: its gradient means nothing.
-    if i >= adam.floats || counters[COUNT_OVERFLOW] != 0u {
+    if i >= adam.floats || i < adam.frozen || counters[COUNT_OVERFLOW] != 0u {
         return;
     }
     let place = i % adam.stride;

@@ -65,7 +65,7 @@ pub(crate) struct EditArgs {
 }
 
 /// Three numbers.
-fn vector(text: &str) -> Result<DVec3, String> {
+pub(super) fn vector(text: &str) -> Result<DVec3, String> {
     let numbers: Result<Vec<f64>, _> = text.split(',').map(|v| v.trim().parse()).collect();
     match numbers.as_deref() {
         Ok(&[x, y, z]) if [x, y, z].iter().all(|v| v.is_finite()) => Ok(DVec3::new(x, y, z)),

@@ -4,6 +4,7 @@
 //! Results go to standard output (as one JSON document with `--json`), everything else to standard
 //! error. Exit codes are listed in `EXIT_CODES`.
 
+mod add;
 mod agent;
 mod agent_scene;
 mod agent_work;
@@ -97,6 +98,7 @@ Examples:
   fmlgs compare langsplat/ scene/ --phrases words.txt --views 0,12 --out side_by_side/
   fmlgs remove scene/ \"the kettle\" --out without_kettle/
   fmlgs locate scene/ photo.jpg         where was this photo taken?
+  fmlgs add scene/ close-ups/ --out closer/   a better scene, where new photos show more
   fmlgs path scene/ --to \"the lid of the kettle\" --out path.json
   fmlgs render scene/ --path path.json --out video.mp4
   fmlgs agent scene/ \"what is on the table?\"
@@ -146,6 +148,7 @@ enum Command {
     Clean(clean::CleanArgs),
     Edit(edit::EditArgs),
     Locate(locate::LocateArgs),
+    Add(add::AddArgs),
     Path(path::PathArgs),
     Agent(agent::AgentArgs),
     Mcp(mcp::McpArgs),
@@ -238,6 +241,7 @@ fn run(cli: Cli, open_window: OpenWindow) -> Result<(), CliError> {
         Command::Clean(args) => clean::run(args, quiet),
         Command::Edit(args) => edit::run(args, quiet),
         Command::Locate(args) => locate::run(&args, quiet),
+        Command::Add(args) => add::run(args, quiet),
         Command::Path(args) => path::run(args),
         Command::Agent(args) => agent::run(args),
         Command::Mcp(args) => mcp::run(args, quiet),

@@ -2,10 +2,12 @@
 
 use std::path::PathBuf;
 
+use glam::DVec3;
 use serde_json::json;
 
+use super::edit::vector;
 use super::progress::Console;
-use super::{CliError, output, view};
+use super::{CliError, number, output, view};
 use crate::jobs::synth::{self, Levels, Rig, SynthOptions, SynthReport};
 
 /// Render a glTF scene into posed photos with object and part ids
@@ -17,6 +19,7 @@ use crate::jobs::synth::{self, Levels, Rig, SynthOptions, SynthReport};
 #[command(after_help = "Examples:\n  \
     fmlgs synth table.glb --out photos/\n  \
     fmlgs synth table.glb --view-count 200 --held-out 25 --size 1280x960 --rig survey --out photos/\n  \
+    fmlgs synth table.glb --view-count 8 --focus 0.2,0.9,0 --radius 0.1 --out close-ups/\n  \
     fmlgs synth table.glb --without \"teddy bear\" --out behind-the-bear/")]
 pub(crate) struct SynthArgs {
     /// The scene: .glb or .gltf with named nodes
@@ -42,6 +45,12 @@ pub(crate) struct SynthArgs {
     /// Placement of the cameras
     #[arg(long, value_enum, default_value_t = SynthOptions::default().rig)]
     rig: Rig,
+    /// Point that the cameras look at, scene units [default: the middle of the objects]
+    #[arg(long, value_name = "X,Y,Z", value_parser = vector, allow_hyphen_values = true)]
+    focus: Option<DVec3>,
+    /// Radius around the focus that fills a photo, scene units [default: that of the objects]
+    #[arg(long, value_parser = number::within(1e-6..=1e6))]
+    radius: Option<f64>,
     /// Rule that makes nodes objects or parts
     #[arg(long, value_enum, default_value_t = SynthOptions::default().levels)]
     levels: Levels,
@@ -75,6 +84,8 @@ impl SynthArgs {
             samples: self.samples,
             fov_y_deg: self.fov,
             rig: self.rig,
+            focus: self.focus,
+            radius: self.radius,
             levels: self.levels,
             points: self.points,
             seed: self.seed,

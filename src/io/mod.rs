@@ -21,6 +21,7 @@ pub(crate) mod folder_lock;
 pub mod gltf_mesh;
 pub(crate) mod gs_output;
 pub(crate) mod http;
+pub(crate) mod joined;
 pub mod khr_gltf;
 pub mod ksplat;
 pub mod labels;

@@ -188,6 +188,9 @@ pub enum JobError {
     Batch(String),
     #[error(transparent)]
     Synth(#[from] SynthError),
+    /// Photos that cannot be added to a scene.
+    #[error("{0}")]
+    AddPhotos(String),
 }
 
 impl JobError {

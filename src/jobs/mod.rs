@@ -3,6 +3,7 @@
 //! Jobs take plain inputs and an [`Observer`](crate::pipeline::observer::Observer) if they take long, and return a
 //! typed result or a [`JobError`]. The caller reports the result in its own way.
 
+pub(crate) mod add;
 pub(crate) mod ask_result;
 pub(crate) mod batch;
 pub(crate) mod bench;

@@ -259,6 +259,7 @@ fn header(count: usize, sh_degree: u8) -> Header {
         round: vec![0],
         budget: 100,
         damping: 1.0,
+        refinement: None,
         history: trained::History::default(),
         unreported: Default::default(),
         inputs: None,

@@ -12,8 +12,8 @@ use super::trained::{self, TrainedScene};
 use super::trainings::Training;
 use super::video::footage;
 use super::{
-    IoError, OpenError, alpha, colmap, files, gs_output, khr_gltf, ksplat, llff, pixel_masks, results, sog, splat,
-    splat_ply, spz, trainings, transforms, unposed,
+    IoError, OpenError, alpha, colmap, files, gs_output, joined, khr_gltf, ksplat, llff, pixel_masks, results, sog,
+    splat, splat_ply, spz, trainings, transforms, unposed,
 };
 use crate::scene::{Axes, Dataset, GaussianCloud};
 
@@ -35,12 +35,18 @@ pub(crate) use among::data_set_around;
 type Result<T> = std::result::Result<T, OpenError>;
 
 /// Layouts of folders that are recognized, in this order, and the reader of each.
-const FOLDERS: [Layout; 9] = [
+const FOLDERS: [Layout; 10] = [
     Layout {
         name: "a trained scene (scene.json)",
         is_of_photos: false,
         is: trained::is_scene,
         open: |p| Ok(Opened::Trained(trained::load(p)?)),
+    },
+    Layout {
+        name: "photos with others that were added to them (joined.json)",
+        is_of_photos: true,
+        is: joined::is_joined,
+        open: |p| Ok(Opened::Dataset(joined::read(p)?)),
     },
     Layout {
         name: "nerfstudio or instant-ngp photos (transforms.json)",

@@ -142,6 +142,7 @@ fn resumed(faulty: bool) -> Finding {
             round: half.round.clone(),
             budget: half.budget,
             damping: half.schedule.damping,
+            refinement: None,
             history: Default::default(),
             unreported: Default::default(),
         };
@@ -247,7 +248,7 @@ pub(crate) fn cases() -> Vec<Case> {
             t.stats.gradient.fill(1.0);
             t.stats.gradient[1] = if faulty { 0.0 } else { 1.0 };
             let mut rng = Pcg64Mcg::seed_from_u64(1);
-            let round = DensityRound { budget: 100, rounds: 1 };
+            let round = DensityRound { budget: 100, rounds: 1, frozen: 0 };
             let done = density::control(&mut t.cloud, &mut t.moments, &t.stats, &round, &mut rng);
             let valid = t.cloud.validate();
             Finding::is(format!("{} divided, {valid:?}", done.divided), valid.is_ok() && done.divided == 24)

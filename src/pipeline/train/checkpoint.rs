@@ -16,6 +16,7 @@ use sha2::{Digest, Sha256};
 use super::TrainConfig;
 use super::density::DensityStats;
 use super::inputs::TrainInputs;
+use super::refine::Refinement;
 use super::trainer::Trainer;
 use super::window::StepWindow;
 use crate::io::files::{self, Summed};
@@ -56,6 +57,9 @@ pub struct Header {
     pub budget: usize,
     /// Factor on the learning rates.
     pub damping: f64,
+    /// Training that this run refines, if it does.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub refinement: Option<Refinement>,
     pub history: History,
     /// Measurements since the last row of `history`; absent in files of earlier versions.
     #[serde(default)]
@@ -209,6 +213,7 @@ mod tests {
             round: Vec::new(),
             budget: 2,
             damping: 1.0,
+            refinement: None,
             history: History::default(),
             unreported: StepWindow::default(),
         };

@@ -30,6 +30,8 @@ pub struct DensityRound {
     pub budget: usize,
     /// Rounds until then, this one included.
     pub rounds: u64,
+    /// Gaussians at the front of the cloud that are neither split nor removed.
+    pub frozen: usize,
 }
 
 /// Report of a round of density control.
@@ -50,11 +52,12 @@ pub fn control(
 ) -> DensityReport {
     let n = cloud.len();
     // 3DGS also removes large ones after the first reset. This removed the background (docs/notes/density-control.md).
-    let stays: Vec<bool> = cloud.opacity_logits.iter().map(|o| o.sigmoid() >= PRUNE_OPACITY).collect();
+    let shows = |(i, o): (usize, &f32)| i < round.frozen || o.sigmoid() >= PRUNE_OPACITY;
+    let stays: Vec<bool> = cloud.opacity_logits.iter().enumerate().map(shows).collect();
     let left = stays.iter().filter(|s| **s).count();
     let room = round.budget.saturating_sub(left).div_ceil(round.rounds.max(1) as usize);
     let needs = |i: usize| stats.gradient[i] >= LEAST_GRADIENT * stats.seen[i].max(1) as f32;
-    let mut dividing: Vec<usize> = (0..n).filter(|&i| stays[i] && needs(i)).collect();
+    let mut dividing: Vec<usize> = (round.frozen..n).filter(|&i| stays[i] && needs(i)).collect();
     if dividing.len() > room {
         dividing.sort_by(|&a, &b| stats.gradient[b].total_cmp(&stats.gradient[a]).then(a.cmp(&b)));
         dividing.truncate(room);
@@ -130,7 +133,7 @@ mod tests {
 
     use super::*;
 
-    const ROUND: DensityRound = DensityRound { budget: 100, rounds: 1 };
+    const ROUND: DensityRound = DensityRound { budget: 100, rounds: 1, frozen: 0 };
 
     fn setup(n: usize) -> (GaussianCloud, [GaussianCloud; 2], DensityStats, Pcg64Mcg) {
         let cloud = GaussianCloud {
@@ -157,6 +160,21 @@ mod tests {
         assert!(moments[1].sh[2..].iter().all(|v| *v == [0.0; 3]));
     }
 
+    #[test]
+    fn frozen_gaussians_keep_their_place_and_all_their_bits() {
+        let (before, mut moments, mut stats, mut rng) = setup(6);
+        let mut cloud = before.clone();
+        stats.gradient = vec![1.0; 6];
+        cloud.opacity_logits = vec![-20.0; 6];
+        let (frozen, before) = (4, cloud.clone());
+        let report = control(&mut cloud, &mut moments, &stats, &DensityRound { frozen, ..ROUND }, &mut rng);
+        assert_eq!(report, DensityReport { divided: 0, pruned: 2 });
+        assert_eq!(cloud, before.select(&[0, 1, 2, 3]));
+        let mut all = before;
+        control(&mut all, &mut moments, &DensityStats::new(6), &ROUND, &mut rng);
+        assert!(all.is_empty(), "the control: all are faint");
+    }
+
     /// Both halves at one position have the transmittance and the integrated alpha of the original.
     #[test]
     fn two_halves_look_like_the_one() {
@@ -180,7 +198,7 @@ mod tests {
     fn growth_is_spread_over_the_rounds_and_goes_to_the_neediest() {
         let (mut cloud, mut moments, mut stats, mut rng) = setup(10);
         stats.gradient = (0..10).map(|i| i as f32).collect();
-        let round = DensityRound { budget: 16, rounds: 3 };
+        let round = DensityRound { budget: 16, rounds: 3, frozen: 0 };
         assert_eq!(control(&mut cloud, &mut moments, &stats, &round, &mut rng).divided, 2);
         assert_eq!((cloud.len(), cloud.positions[7]), (12, [7.0, 0.0, 0.0]));
         // The sum counts, not the mean: a Gaussian in few pictures ranks below one in many.

@@ -45,6 +45,11 @@ impl DeviceRun {
         Ok(Self { trainer, photos })
     }
 
+    /// Keeps the first Gaussians of the cloud as they are.
+    pub(crate) fn freeze(&mut self, gaussians: usize) {
+        self.trainer.freeze(gaussians);
+    }
+
     pub(crate) fn upload(
         &mut self,
         cloud: &GaussianCloud,

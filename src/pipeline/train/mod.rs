@@ -5,6 +5,7 @@
 //!
 //! On the CPU a seed determines the result, and a resumed run ends where an uninterrupted one does.
 
+pub(crate) mod active;
 pub(crate) mod border;
 pub(crate) mod budget;
 pub mod checkpoint;
@@ -19,6 +20,8 @@ pub(crate) mod inputs;
 mod optimizer;
 mod outcome;
 mod photos;
+pub(crate) mod refine;
+mod resume;
 mod run;
 pub(crate) mod schedule;
 mod sweep;
@@ -30,6 +33,7 @@ pub use config::TrainConfig;
 pub(crate) use folder::FolderUse;
 pub(crate) use outcome::{TrainEnd, TrainError, TrainOutcome};
 pub(crate) use photos::load_views;
+pub(crate) use resume::begin_refinement;
 pub(crate) use run::{run, run_on};
 
 use crate::scene::{Camera, PhotoPixels};

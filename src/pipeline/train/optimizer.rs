@@ -37,6 +37,8 @@ pub(super) struct Update {
     pub(super) adam: AdamStep,
     pub(super) stride: usize,
     pub(super) active: usize,
+    /// Gaussians at the front of the cloud that stay as they are.
+    pub(super) frozen: usize,
     /// Center of the camera relative to the cloud's origin, if Gaussians carry their normals as extra channels.
     pub(super) eye: Option<[f32; 3]>,
 }
@@ -117,10 +119,10 @@ fn update_all(adam: &AdamStep, [p, m, v]: [&mut [f32]; 3], g: &[f32], rate: f32)
 /// Updates a block and returns its statistics.
 #[multiversion::multiversion(targets("x86_64+avx2+fma"))]
 fn step_block(renderer: &DifferentiableRenderer, block: &mut Block<'_>, update: &Update) -> StepStats {
-    let Update { rates, adam, stride, active, eye } = update;
+    let Update { rates, adam, stride, active, frozen, eye } = update;
     let Block { first, p, m, v, gradient, seen } = block;
     let mut left = StepStats::default();
-    for i in 0..p.positions.len() {
+    for i in frozen.saturating_sub(*first).min(p.positions.len())..p.positions.len() {
         let own = i * stride..(i + 1) * stride;
         let gaussian = Gaussian {
             position: p.positions[i],

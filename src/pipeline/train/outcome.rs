@@ -5,7 +5,7 @@ use std::sync::Arc;
 use super::checkpoint::CheckpointError;
 use crate::io::IoError;
 use crate::math::finite::NotFinite;
-use crate::pipeline::observer::Evaluation;
+use crate::pipeline::observer::{Evaluation, Interrupted};
 use crate::render::{GpuError, RenderError};
 use crate::scene::GaussianCloud;
 
@@ -57,4 +57,6 @@ pub enum TrainError {
     NotFinite(#[from] NotFinite),
     #[error("{0}")]
     Config(String),
+    #[error("canceled")]
+    Interrupted(#[from] Interrupted),
 }

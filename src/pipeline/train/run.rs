@@ -16,7 +16,7 @@ use super::outcome::{TrainEnd, TrainError, TrainOutcome};
 use super::photos::{before_backdrop, load_training, load_views, tell_marks, tell_of_pixels};
 use super::trainer::{REPORT_STEPS, StepError, Trainer};
 use super::window::StepWindow;
-use super::{TrainConfig, TrainView, coarse, density, geometry, init};
+use super::{TrainConfig, TrainView, coarse, density, geometry, init, refine};
 use crate::io::SceneFolder;
 use crate::io::trained::{History, SceneInfo};
 use crate::math::format::count;
@@ -77,12 +77,15 @@ pub(crate) fn run_on(
         observer.cloud(Arc::clone(&done.cloud), done.steps);
         return Ok(done);
     }
-    let Some(views) = load_training(dataset, &train, config, observer)? else {
+    let refinement = saved.as_ref().and_then(|s| s.header.refinement.clone());
+    let train = refine::those_of(refinement.as_ref(), dataset, train);
+    let Some(mut views) = load_training(dataset, &train, config, observer)? else {
         return Ok(TrainOutcome::stopped_early());
     };
     let Some(tests) = load_views(dataset, &held, config, "Loading held-out photos", observer)? else {
         return Ok(TrainOutcome::stopped_early());
     };
+    refine::absorb(refinement.as_ref(), &mut views);
     let dataset = &*before_backdrop(dataset, &views, observer);
     let mut job = Job::start(dataset, config, scene, &held, (views, tests), saved);
     (job.inputs, job.remake) = (inputs, may.remake);
@@ -142,17 +145,11 @@ impl<'a> Job<'a> {
         // More steps mean more coarse steps; a run that already trained at full size does not go back.
         let was_coarse = saved.as_ref().is_none_or(|s| s.header.step < coarse::steps(&s.header.config));
         let mut trainer = match saved {
-            Some(s) => {
-                let mut t = Trainer::new(s.cloud, config, background, extent, s.header.rng);
-                t.moments = s.moments;
-                t.stats = s.stats;
-                t.step = s.header.step;
-                // Photos may have gone since.
-                t.round = s.header.round.into_iter().filter(|k| (*k as usize) < views.len()).collect();
-                t.budget = s.header.budget;
-                t.schedule.damping = s.header.damping;
-                (secs, history, unreported) = (s.header.secs, s.header.history, s.header.unreported);
-                t
+            Some(mut s) => {
+                let h = &mut s.header;
+                (secs, history, unreported) =
+                    (h.secs, std::mem::take(&mut h.history), std::mem::take(&mut h.unreported));
+                s.trainer(config, background, extent, &views)
             }
             None => {
                 let mut cloud = init::initial_cloud(dataset, &views, config.sh_degree, config.random_points, &mut rng);
@@ -364,6 +361,7 @@ impl<'a> Job<'a> {
             round: t.round.clone(),
             budget: t.budget,
             damping: t.schedule.damping,
+            refinement: t.refinement.clone(),
             history: self.history.clone(),
             unreported: self.unreported.clone(),
         };

@@ -7,11 +7,15 @@ use crate::render::{AdamStep, Rates};
 
 /// Number of steps of 3DGS's milestones.
 const REFERENCE_STEPS: f64 = 30_000.0;
+/// Intervals of density control in the steps of a refinement.
+const REFINING_ROUNDS: u64 = 25;
 
 /// Learning rates and milestones of a run.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Schedule {
     steps: u64,
+    /// Step from which a refinement goes on; 0 in other runs.
+    from: u64,
     sh_degree: u8,
     extent: f64,
     /// Factor on every rate, lowered after a divergence.
@@ -33,6 +37,7 @@ impl Schedule {
         let scaled = |reference: f64| (reference * n / REFERENCE_STEPS).round() as u64;
         Self {
             steps: config.steps,
+            from: 0,
             sh_degree: config.sh_degree,
             extent,
             damping: 1.0,
@@ -45,13 +50,36 @@ impl Schedule {
         }
     }
 
-    /// Rates at `step`, counted from 0: exponential decay by 100 for positions, constant otherwise.
+    /// Schedule of a refinement that goes on from a step: all bands of color are open, Gaussians are added in the first
+    /// part, and no opacity is reset.
+    pub(crate) fn refining(config: &TrainConfig, extent: f64, from: u64) -> Self {
+        let n = config.steps.saturating_sub(from);
+        let densify_interval = (n / REFINING_ROUNDS).clamp(10, 100);
+        Self {
+            from,
+            sh_interval: 0,
+            densify_from: from + densify_interval,
+            densify_until: from + n * 2 / 5,
+            densify_interval,
+            reset_interval: u64::MAX,
+            ..Self::new(config, extent)
+        }
+    }
+
+    /// Steps of this run that are done at `step`.
+    pub(crate) fn done(&self, step: u64) -> u64 {
+        step.saturating_sub(self.from)
+    }
+
+    /// Rates at `step`, counted from 0: exponential decay by 100 for positions, constant otherwise. In a refinement all
+    /// end low, so that photos which agreed before agree again; positions begin a little above the end of training.
     pub(crate) fn rates(&self, step: u64) -> Rates {
-        let t = step as f64 / self.steps.max(1) as f64;
-        let position = 1.6e-4 * self.extent * 0.01_f64.powf(t);
-        let rate = |r: f64| (r * self.damping) as f32;
+        let t = self.done(step) as f64 / self.done(self.steps).max(1) as f64;
+        let (begin, settle) = if self.from > 0 { (0.5, 0.1_f64.powf(t)) } else { (0.0, 1.0) };
+        let position = 1.6e-4 * self.extent * 0.01_f64.powf(begin + t * (1.0 - begin));
+        let rate = |r: f64| (r * settle * self.damping) as f32;
         Rates {
-            position: rate(position),
+            position: (position * self.damping) as f32,
             log_scale: rate(5e-3),
             quaternion: rate(1e-3),
             opacity_logit: rate(5e-2),
@@ -68,7 +96,8 @@ impl Schedule {
 
     /// Returns whether Gaussians are added and removed after `done` steps.
     pub(crate) fn densifies(&self, done: u64) -> bool {
-        done >= self.densify_from && done <= self.densify_until && done % self.densify_interval == 0
+        let is_due = self.done(done) % self.densify_interval == 0;
+        done >= self.densify_from && done <= self.densify_until && is_due
     }
 
     /// Rounds of density control left after `done` steps, including the present one.
@@ -84,7 +113,7 @@ impl Schedule {
 
     /// Adam's constants for the step after `step`.
     pub(crate) fn adam(&self, step: u64) -> AdamStep {
-        AdamStep::new(step + 1)
+        AdamStep::new(self.done(step) + 1)
     }
 }
 
@@ -102,6 +131,22 @@ mod tests {
         let (a, b) = (s.rates(0).position, s.rates(1_000).position);
         assert!((a - 3.2e-4).abs() < 1e-9 && (a / b - 100.0).abs() < 1e-2);
         assert_eq!(s.rates(0).opacity_logit, s.rates(999).opacity_logit);
+    }
+
+    #[test]
+    fn a_refinement_begins_low_ends_lower_and_resets_nothing() {
+        let config = TrainConfig { steps: 7_900, ..TrainConfig::default() };
+        let (s, end) = (Schedule::refining(&config, 2.0, 7_000), schedule(7_000).rates(7_000));
+        let [first, last] = [7_000, 7_900].map(|step| s.rates(step));
+        assert!(first.position > 5.0 * end.position && last.position < 1.01 * end.position);
+        assert!(first.opacity_logit == end.opacity_logit && last.opacity_logit < 0.2 * end.opacity_logit);
+        assert_eq!(s.sh_degree(7_000), 3);
+        assert!(!(7_000..=7_900).any(|done| s.resets(done)));
+        let rounds: Vec<u64> = (7_000..=7_900).filter(|done| s.densifies(*done)).collect();
+        assert!(rounds.len() >= 10 && rounds.last().is_some_and(|last| *last <= 7_360), "{rounds:?}");
+        assert!(rounds.iter().zip((1..=rounds.len() as u64).rev()).all(|(done, left)| s.rounds_left(*done) == left));
+        let first_step = |s: &Schedule, step| s.adam(step).first_correction;
+        assert_eq!(first_step(&s, 7_000), first_step(&schedule(7_000), 0), "its moments begin at zero");
     }
 
     #[test]

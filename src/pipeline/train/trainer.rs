@@ -8,6 +8,7 @@ use super::density::{self, DensityReport, DensityRound, DensityStats};
 use super::device::{DeviceRun, LAMBDA, StepResult};
 use super::geometry::GeometryLoss;
 use super::optimizer::{StepStats, Update};
+use super::refine::{self, Refinement};
 use super::schedule::Schedule;
 use super::{TrainConfig, TrainView};
 use crate::math::finite::{CHECKED, NotFinite, all_finite};
@@ -54,6 +55,10 @@ pub struct Trainer {
     /// Number of steps done.
     pub step: u64,
     pub(crate) budget: usize,
+    /// Training that this one refines, if it does.
+    pub(crate) refinement: Option<Refinement>,
+    /// Turns of each photo in a round of a refinement.
+    pub(crate) turns: Vec<u32>,
     settings: RenderSettings,
     /// Seed of the background color of each step.
     seed: u64,
@@ -80,6 +85,8 @@ impl Trainer {
             round: Vec::new(),
             step: 0,
             budget: config.max_gaussians.unwrap_or(usize::MAX),
+            refinement: None,
+            turns: Vec::new(),
             settings: config.render_settings(Some(background), extent),
             seed: config.seed,
             unknown_backdrop: false,
@@ -110,8 +117,15 @@ impl Trainer {
         (color, if cut_out { std::array::from_fn(|c| color[c] - usual[c]) } else { [0.0; 3] })
     }
 
+    /// Number of Gaussians at the front of the cloud that stay as they are.
+    fn frozen(&self) -> usize {
+        self.refinement.as_ref().map_or(0, |r| r.frozen)
+    }
+
     pub(crate) fn move_to(&mut self, device: &Device, views: &[TrainView]) -> Result<(), GpuError> {
-        let device = DeviceRun::new(device, &self.cloud, &self.moments, self.step, self.settings.clone(), views)?;
+        let step = self.schedule.done(self.step);
+        let mut device = DeviceRun::new(device, &self.cloud, &self.moments, step, self.settings.clone(), views)?;
+        device.freeze(self.frozen());
         self.device = Some(device);
         Ok(())
     }
@@ -134,7 +148,7 @@ impl Trainer {
 
     fn send(&mut self) -> Result<(), GpuError> {
         match &mut self.device {
-            Some(device) => device.upload(&self.cloud, &self.moments, self.step),
+            Some(device) => device.upload(&self.cloud, &self.moments, self.schedule.done(self.step)),
             None => Ok(()),
         }
     }
@@ -160,7 +174,7 @@ impl Trainer {
     /// every `REPORT_STEPS` steps, those since the last ones.
     pub fn advance(&mut self, views: &[TrainView]) -> Result<Vec<StepResult>, StepError> {
         if self.round.is_empty() {
-            self.round = (0..views.len() as u32).collect();
+            self.round = refine::round(views.len(), &self.turns);
             self.round.shuffle(&mut self.rng);
         }
         let next = self.round.pop().map(|i| i as usize);
@@ -207,7 +221,8 @@ impl Trainer {
         self.fetch()?;
         let mut report = None;
         if densifies {
-            let round = DensityRound { budget: self.budget, rounds: self.schedule.rounds_left(self.step) };
+            let (rounds, frozen) = (self.schedule.rounds_left(self.step), self.frozen());
+            let round = DensityRound { budget: self.budget, rounds, frozen };
             let (cloud, moments) = (&mut self.cloud, &mut self.moments);
             report = Some(density::control(cloud, moments, &self.stats, &round, &mut self.rng));
             self.stats = DensityStats::new(self.cloud.len());
@@ -273,6 +288,7 @@ impl Trainer {
             rates: self.schedule.rates(self.step),
             adam: self.schedule.adam(self.step),
             stride: self.cloud.sh_stride(),
+            frozen: self.frozen(),
             active: sh::coefficients(self.settings.sh_degree.min(self.cloud.sh_degree)),
             eye: self.geometry.draws_normals(self.step).then(|| normals::eye(camera, &self.cloud)),
         }

@@ -54,9 +54,16 @@ impl Adam {
         })
     }
 
-    /// Sets the constants of step `t`, counted from 1, for `gaussians` Gaussians of which `stored`
-    /// degrees are kept and `active` trained.
-    pub(crate) fn prepare(&self, device: &Device, gaussians: u32, [stored, active]: [u8; 2], rates: &Rates, t: u64) {
+    /// Sets the constants of step `t`, counted from 1, for `gaussians` Gaussians of which the first `frozen` stay, and
+    /// of which `stored` degrees are kept and `active` trained.
+    pub(crate) fn prepare(
+        &self,
+        device: &Device,
+        [gaussians, frozen]: [u32; 2],
+        [stored, active]: [u8; 2],
+        rates: &Rates,
+        t: u64,
+    ) {
         let constants = Constants::new(t);
         for ((buffer, stride), rates) in self.steps.iter().zip(strides(stored)).zip(records(rates, active)) {
             let mut step = AdamStep {
@@ -70,6 +77,7 @@ impl Adam {
                 clip: CLIP,
                 growth: GROWTH,
                 outlier: OUTLIER,
+                frozen: frozen * stride as u32,
                 ..AdamStep::default()
             };
             step.rates.as_flattened_mut().copy_from_slice(&rates);

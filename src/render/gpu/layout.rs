@@ -146,8 +146,9 @@ twins! {
         growth: f32,
         /// A gradient this many times too large is counted.
         outlier: f32,
+        /// Floats at the front that stay as they are.
+        frozen: u32,
         pad0: f32,
-        pad1: f32,
     }
 }
 

@@ -71,6 +71,8 @@ pub struct GpuTrainer {
     gradient_capacity: [usize; 2],
     features: wgpu::Buffer,
     step: u64,
+    /// Gaussians at the front of the cloud that stay as they are.
+    frozen: u32,
     /// True if a frame of this cloud has counted the pairs it needs.
     sized: bool,
     /// Steps in the ring: number and pixels.
@@ -106,6 +108,7 @@ impl GpuTrainer {
             gradient_capacity: [0, 0],
             features: device.storage("features", 0)?,
             step: 0,
+            frozen: 0,
             sized: false,
             pending: Vec::new(),
             fetched: Vec::new(),
@@ -125,6 +128,11 @@ impl GpuTrainer {
 
     pub(crate) fn len(&self) -> usize {
         self.shape.gaussians as usize
+    }
+
+    /// Keeps the first Gaussians of the cloud as they are.
+    pub fn freeze(&mut self, gaussians: usize) {
+        self.frozen = gaussians as u32;
     }
 
     /// Steps done.
@@ -210,7 +218,7 @@ impl GpuTrainer {
         self.ssim.prepare(&self.device, size_px, self.pending.len(), self.settings.lambda, shift)?;
         let degrees = [self.shape.degree, sh_degree.min(self.shape.degree)];
         let n = self.shape.gaussians;
-        self.adam.prepare(&self.device, n, degrees, rates, self.step + 1);
+        self.adam.prepare(&self.device, [n, self.frozen], degrees, rates, self.step + 1);
         let submitted = self.encode_step(photo);
         self.ahead.push_back(submitted);
         if self.ahead.len() > AHEAD {

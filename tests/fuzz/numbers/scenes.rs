@@ -303,7 +303,7 @@ pub fn training(n: &mut Numbers) -> Verdict {
         seen: (0..count).map(|_| n.below(5) as u32).collect(),
     };
     let budget = n.below(2 * count + 2);
-    let round = DensityRound { budget, rounds: 1 + n.below(5) as u64 };
+    let round = DensityRound { budget, rounds: 1 + n.below(5) as u64, frozen: 0 };
     let mut rng = n.rng();
     let Trainer { cloud, moments, .. } = &mut trainer;
     density::control(cloud, moments, &stats, &round, &mut rng);

@@ -12,13 +12,14 @@
 //!    in the paper.
 //! 5. [`embed`] gives every identity its embedding; [`mask_vectors`] takes it from vectors that came with the masks.
 //!
-//! A known map changes by [`edit`] and [`add_photo`]. [`keep`] holds edited objects in a new search, and [`carry`]
+//! A known map changes by [`edit`], [`add_photo`] and the masks of close-ups ([`closer`]). [`keep`] holds edited objects in a new search, and [`carry`]
 //! takes the map to other Gaussians of the scene.
 
 pub(crate) mod add_photo;
 mod associate;
 pub(crate) mod build_map;
 pub(crate) mod carry;
+pub(crate) mod closer;
 pub mod codes;
 pub mod edit;
 pub(crate) mod embed;
