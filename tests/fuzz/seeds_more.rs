@@ -261,6 +261,7 @@ fn header(count: usize, sh_degree: u8) -> Header {
         damping: 1.0,
         history: trained::History::default(),
         unreported: Default::default(),
+        fits: Vec::new(),
         inputs: None,
     }
 }
