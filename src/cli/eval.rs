@@ -18,6 +18,7 @@ use crate::jobs::evaluate_masks::Protocol;
 use crate::jobs::export;
 use crate::pipeline::observer::{Evaluation, ViewScore};
 use crate::pipeline::semantics::query::recipe::QueryConfig;
+use crate::scene::FittedParts;
 
 /// Measure PSNR and SSIM of a scene on held-out photos
 ///
@@ -56,6 +57,14 @@ pub(crate) struct EvalArgs {
     /// Folder for images: photo, render and difference side by side
     #[arg(long)]
     pictures: Option<PathBuf>,
+    /// Score each photo a second time with its pose aligned to the scene by the colors, as where training refined
+    /// poses (--refine-poses); the first score stays
+    #[arg(long)]
+    align_poses: bool,
+    /// Score each photo a second time after the best gain and bias of each channel, as where training learned
+    /// exposures (--exposure)
+    #[arg(long)]
+    fit_exposure: bool,
     /// Compare objects and parts instead, with these labels: each named region of a held-out photo
     /// is asked for by its name
     #[arg(long)]
@@ -92,10 +101,12 @@ pub(crate) struct EvalArgs {
 
 /// The table `[eval]` of a batch.
 pub(super) fn of_table(table: &toml::Table) -> Result<BatchEvaluation, String> {
-    const LEFT_OUT: [&str; 11] = [
+    const LEFT_OUT: [&str; 13] = [
         "photos",
         "held-out-every",
         "pictures",
+        "align-poses",
+        "fit-exposure",
         "masks",
         "decoder",
         "encoder",
@@ -150,6 +161,7 @@ impl EvalArgs {
             holdout_every: self.held_out_every,
             keep_borders: self.keep_borders,
             pictures: self.pictures.clone(),
+            fit: FittedParts { pose: self.align_poses, exposure: self.fit_exposure },
         };
         Ok(PhotoComparison::new(&scene, &photos, options)?)
     }
@@ -209,6 +221,7 @@ pub(crate) fn run(args: EvalArgs, quiet: bool) -> Result<(), CliError> {
             "ssim": found.ssim,
             "held_out": means(&held_out),
             "trained_on": means(&trained_on),
+            "fitted": found.fitted,
             "views": found.views.iter().zip(seen).map(view).collect::<Vec<_>>(),
         }));
     }
@@ -229,5 +242,6 @@ pub(crate) fn run(args: EvalArgs, quiet: bool) -> Result<(), CliError> {
         (None, Some(trained_on)) => mean(" trained on", trained_on),
         _ => mean("", &found),
     }
-    output::print(&output::table(&rows))
+    output::print(&output::table(&rows))?;
+    found.fitted.as_ref().map_or(Ok(()), |fitted| output::print(&format!("the same: {}", fitted.line())))
 }

@@ -35,6 +35,7 @@ use crate::scene::{AlphaUse, Dataset};
     fmlgs train walk.mp4 --out scene/        a video: photos, poses and training in one\n  \
     fmlgs train photos/ --out scene/ --steps 30000 --max-side 1600\n  \
     fmlgs train photos/ --out quick/ --steps 500 --max-side 256 --no-densify\n  \
+    fmlgs train phone/ --out scene/ --refine-poses --exposure\n  \
     fmlgs train photos/ --serve              watch from another computer, see fmlgs connect\n  \
     fmlgs train other/ --preset scene/training.toml\n  \
     fmlgs train scene/                       resume a scene that was canceled, same settings")]
@@ -136,6 +137,15 @@ pub(crate) struct TrainOverrides {
     /// Weight of the term that pulls surfels together along rays [default: 0.1]
     #[arg(long, value_parser = number::within(0.0..=1e6), requires = "surfels")]
     pub(crate) distortion_weight: Option<f64>,
+    /// Refine the poses of the training photos while training, and tell how far they moved: for poses that are a
+    /// little off (about 1 % of the scene's radius, half a degree), as those of phones and of video are. The given
+    /// poses stay in their file; on the CPU only
+    #[arg(long)]
+    pub(crate) refine_poses: bool,
+    /// Learn a gain and bias by channel for every training photo: for photos that differ in brightness or white
+    /// balance; on the CPU only
+    #[arg(long)]
+    pub(crate) exposure: bool,
 }
 
 impl TrainOverrides {
@@ -160,6 +170,8 @@ impl TrainOverrides {
             surfels: base.surfels || self.surfels,
             normal_weight: self.normal_weight.or(base.normal_weight),
             distortion_weight: self.distortion_weight.or(base.distortion_weight),
+            refine_poses: base.refine_poses || self.refine_poses,
+            exposure: base.exposure || self.exposure,
         }
     }
 }

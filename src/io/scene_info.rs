@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use super::scene_files::SCENE_FILE;
 use super::{IoError, files};
-use crate::scene::{Camera, Dataset, Evaluation, StepMetrics, text};
+use crate::scene::{Camera, Dataset, Evaluation, PhotoFit, StepMetrics, text};
 
 /// Version of the folder's format that this program writes, and the highest it reads.
 pub const VERSION: u64 = 1;
@@ -38,6 +38,9 @@ pub struct SceneInfo {
     /// Measurements of the training run.
     #[serde(default)]
     pub history: History,
+    /// Findings about the training photos, if poses were refined or exposures learned.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub photo_fits: Vec<PhotoFit>,
     /// True if Gaussians were moved, recolored, duplicated or deleted since training, so that the photos differ from
     /// the scene.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]

@@ -14,11 +14,12 @@ use crate::math::format::things;
 use crate::math::stats::median;
 use crate::pipeline::depth::{self, DepthCounter, DepthScores};
 use crate::pipeline::evaluate::scores;
+use crate::pipeline::evaluate_fitted::HeldOutFit;
 use crate::pipeline::observer::{Evaluation, Observer, Severity, Ticker, ViewScore};
 use crate::pipeline::train::TrainView;
 use crate::pipeline::train::border::Borders;
 use crate::render::{Features, RenderSettings, Renderer};
-use crate::scene::{Camera, Dataset, GaussianCloud};
+use crate::scene::{Camera, Dataset, FittedParts, FittedScore, GaussianCloud};
 
 /// The difference picture shows errors this many times larger.
 const DIFFERENCE_GAIN: i32 = 4;
@@ -34,6 +35,8 @@ pub(crate) struct EvaluateOptions {
     pub(crate) keep_borders: bool,
     /// Folder for pictures: photo, render and difference side by side.
     pub(crate) pictures: Option<PathBuf>,
+    /// What is fitted of each photo for a second score, beside what training learned of its own photos.
+    pub(crate) fit: FittedParts,
 }
 
 /// A scene beside the photos that it is compared with.
@@ -52,6 +55,8 @@ pub(crate) struct PhotoComparison {
     pub(crate) state: Option<String>,
     /// Differences between the scene and its photos.
     pub(crate) changed: ChangedScene,
+    /// What is fitted of each photo for a second score.
+    pub(crate) fit: Option<FittedParts>,
 }
 
 impl PhotoComparison {
@@ -62,7 +67,7 @@ impl PhotoComparison {
 
     /// Prepares the comparison of `scene` with the photos of `dataset`.
     pub(crate) fn of(scene: &Scene, dataset: Arc<Dataset>, options: EvaluateOptions) -> Result<Self, JobError> {
-        let EvaluateOptions { max_side_px, holdout_every, keep_borders, pictures } = options;
+        let EvaluateOptions { max_side_px, holdout_every, keep_borders, pictures, fit } = options;
         let dataset = match dataset.with_alpha(scene.config.alpha) {
             Cow::Borrowed(_) => dataset,
             Cow::Owned(other) => Arc::new(other),
@@ -89,7 +94,9 @@ impl PhotoComparison {
         };
         let trained_on = views.iter().map(seen).collect();
         let (state, changed) = (scene.state.clone(), ChangedScene::of(scene, &dataset));
-        Ok(Self { cloud, settings, dataset, views, trained_on, max_side_px, borders, pictures, state, changed })
+        let learned = scene.config.held_out_fit().unwrap_or_default();
+        let fit = FittedParts { pose: fit.pose || learned.pose, exposure: fit.exposure || learned.exposure }.some();
+        Ok(Self { cloud, settings, dataset, views, trained_on, max_side_px, borders, pictures, state, changed, fit })
     }
 
     pub(crate) fn view(&self, index: usize) -> Result<TrainView, JobError> {
@@ -131,6 +138,10 @@ pub(crate) fn photometric(comparison: &PhotoComparison, observer: &mut dyn Obser
     let PhotoComparison { cloud, settings, .. } = comparison;
     let mut renderer = Renderer::new();
     let mut views: Vec<ViewScore> = Vec::with_capacity(comparison.views.len());
+    let mut fit = match comparison.fit {
+        Some(parts) => Some((parts, HeldOutFit::new(Arc::clone(cloud), settings, parts)?, Vec::new())),
+        None => None,
+    };
     let mut left_out = None;
     comparison.walk("Measuring", observer, |index| {
         let view = match comparison.view(index) {
@@ -142,6 +153,9 @@ pub(crate) fn photometric(comparison: &PhotoComparison, observer: &mut dyn Obser
         };
         let draw = |camera: &Camera| renderer.render(cloud, Features::NONE, camera, settings);
         views.extend(scores(std::slice::from_ref(&view), draw)?);
+        if let Some((_, fit, fitted)) = &mut fit {
+            fitted.extend(fit.score(&view)?);
+        }
         if let Some(folder) = &comparison.pictures {
             export::make_folder(folder)?;
             side_by_side(cloud, settings, &view, &folder.join(picture_name(index, &view.name)))?;
@@ -155,7 +169,8 @@ pub(crate) fn photometric(comparison: &PhotoComparison, observer: &mut dyn Obser
         }
         observer.note(Severity::Warning, format!("{} left out: {last}", things(n, "photo")));
     }
-    Ok(Evaluation::of(views, cloud.len(), 0, 0.0))
+    let fitted = fit.map(|(parts, _, views)| FittedScore::of(parts, views));
+    Ok(Evaluation { fitted, ..Evaluation::of(views, cloud.len(), 0, 0.0) })
 }
 
 /// Compares drawn depth with the true depth of synthetic photos; returns the median milliseconds of drawing it, too.

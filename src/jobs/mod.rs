@@ -48,6 +48,7 @@ pub(crate) mod presets;
 pub(crate) mod query;
 pub(crate) mod rearrange;
 pub mod recent;
+pub(crate) mod refined;
 pub(crate) mod remove;
 pub(crate) mod render;
 pub(crate) mod report;

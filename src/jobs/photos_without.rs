@@ -8,6 +8,7 @@ use std::path::Path;
 use glam::DVec3;
 use serde_json::json;
 
+use super::refined::at_refined_poses;
 use super::{JobError, Scene, export, open, train};
 use crate::io::transforms::opengl_pose;
 use crate::io::{self, IoError, SceneFolder, atomic, files, points_ply, trained};
@@ -89,7 +90,10 @@ fn write(
     out: &Path,
     observer: &mut dyn Observer,
 ) -> Result<(), JobError> {
-    let dataset = open::dataset(&from.photos(None)?)?.with_alpha(from.config.alpha).into_owned();
+    let mut dataset = open::dataset(&from.photos(None)?)?.with_alpha(from.config.alpha).into_owned();
+    if let Some(folder) = &from.folder {
+        at_refined_poses(&mut dataset.photos, &trained::load_info(folder)?);
+    }
     export::make_parent(&out.join("images").join("0"))?;
     let json = |file: &str, value: &serde_json::Value| {
         atomic::write(&out.join(file), |w| serde_json::to_writer_pretty(w, value).map_err(Into::into))

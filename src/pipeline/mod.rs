@@ -4,6 +4,7 @@
 pub(crate) mod cleaning;
 pub(crate) mod depth;
 pub(crate) mod evaluate;
+pub(crate) mod evaluate_fitted;
 pub(crate) mod frames;
 pub(crate) mod locate;
 pub(crate) mod metrics;

@@ -49,21 +49,80 @@ pub struct Evaluation {
     pub gaussians: usize,
     /// Each view.
     pub views: Vec<ViewScore>,
+    /// The same after a fit of each held-out photo, if one was made.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub fitted: Option<FittedScore>,
+}
+
+/// What is fitted of a held-out photo before it is scored.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct FittedParts {
+    /// Its pose, to the trained scene.
+    pub pose: bool,
+    /// A gain and bias by channel.
+    pub exposure: bool,
+}
+
+impl FittedParts {
+    /// Itself, if anything is fitted.
+    pub(crate) fn some(self) -> Option<Self> {
+        (self.pose || self.exposure).then_some(self)
+    }
+
+    fn text(self) -> &'static str {
+        match (self.pose, self.exposure) {
+            (true, true) => "with each held-out pose aligned and the best gain and bias",
+            (true, false) => "with each held-out pose aligned",
+            (false, true) => "with the best gain and bias of each",
+            (false, false) => "as they are",
+        }
+    }
+}
+
+/// Quality on the held-out photos after a fit.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct FittedScore {
+    /// What was fitted.
+    #[serde(flatten)]
+    pub parts: FittedParts,
+    /// Mean PSNR in dB over the views.
+    #[serde(with = "or_null")]
+    pub psnr: f64,
+    /// Mean SSIM over the views.
+    #[serde(with = "or_null")]
+    pub ssim: f64,
+    /// Each view.
+    pub views: Vec<ViewScore>,
+}
+
+impl FittedScore {
+    /// The means of views' scores.
+    pub(crate) fn of(parts: FittedParts, views: Vec<ViewScore>) -> Self {
+        let of = |f: fn(&ViewScore) -> f64| mean(&views.iter().map(f).collect::<Vec<_>>());
+        Self { parts, psnr: of(|s| s.psnr), ssim: of(|s| s.ssim), views }
+    }
+
+    /// `PSNR 24.10 dB, SSIM 0.812 with each held-out pose aligned`.
+    pub(crate) fn line(&self) -> String {
+        format!("PSNR {:.2} dB, SSIM {:.3} {}", self.psnr, self.ssim, self.parts.text())
+    }
 }
 
 impl Evaluation {
     /// The means of views' scores after `step` steps, which took `secs`.
     pub(crate) fn of(views: Vec<ViewScore>, gaussians: usize, step: u64, secs: f64) -> Self {
         let of = |f: fn(&ViewScore) -> f64| mean(&views.iter().map(f).collect::<Vec<_>>());
-        Self { step, secs, psnr: of(|s| s.psnr), ssim: of(|s| s.ssim), gaussians, views }
+        Self { step, secs, psnr: of(|s| s.psnr), ssim: of(|s| s.ssim), gaussians, views, fitted: None }
     }
 
     /// `step 500, 12.3 s: held-out PSNR 21.34 dB, SSIM 0.712 over 9 views, 23,121 Gaussians`.
     pub(crate) fn line(&self) -> String {
-        let Self { step, secs, psnr, ssim, gaussians, views } = self;
+        let Self { step, secs, psnr, ssim, gaussians, views, fitted } = self;
         let (views, gaussians) = (views.len(), count(*gaussians as u64));
+        let fitted = fitted.as_ref().map_or_else(String::new, |f| format!("; {}", f.line()));
         format!(
-            "step {step}, {secs:.1} s: held-out PSNR {psnr:.2} dB, SSIM {ssim:.3} over {views} views, {gaussians} Gaussians"
+            "step {step}, {secs:.1} s: held-out PSNR {psnr:.2} dB, SSIM {ssim:.3} over {views} views, {gaussians} \
+             Gaussians{fitted}"
         )
     }
 }

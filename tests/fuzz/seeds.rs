@@ -313,6 +313,7 @@ pub fn scene() -> Vec<u8> {
         ssim: 0.5,
         gaussians: 2,
         views: vec![],
+        fitted: None,
     });
     serde_json::to_vec(&info).expect("write")
 }

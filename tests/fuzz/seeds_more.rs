@@ -262,6 +262,7 @@ fn header(count: usize, sh_degree: u8) -> Header {
         refinement: None,
         history: trained::History::default(),
         unreported: Default::default(),
+        fits: Vec::new(),
         inputs: None,
     }
 }

@@ -36,6 +36,8 @@ const TRAINING: &[&str] = &[
     "surfels",
     "normal_weight",
     "distortion_weight",
+    "refine_poses",
+    "exposure",
 ];
 
 const fn rule(
@@ -130,6 +132,9 @@ pub(super) const RULES: &[Rule] = &[
         when(g.has("masks") && strokes, "with this --protocol, which draws no images")
     }),
     rule(&["eval"], &["keep_borders"], |g| when(g.has("masks"), "with --masks, which compares no colors")),
+    rule(&["eval"], &["align_poses", "fit_exposure"], |g| {
+        when(g.has_any(&["masks", "questions", "depth", "removal"]), "where no colors are compared with photos")
+    }),
     rule(&["eval"], &["keep_borders", "pictures"], |g| {
         when(g.has("questions"), "with --questions, which draws no images")
     }),

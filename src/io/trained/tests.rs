@@ -5,7 +5,9 @@ use glam::{DMat3, DVec2, DVec3};
 use std::fs;
 
 use super::*;
-use crate::scene::{Camera, Dataset, Evaluation, ExtraProperty, Photo, StepMetrics, ViewScore};
+use crate::scene::{
+    Camera, Dataset, Evaluation, ExtraProperty, Photo, PhotoExposure, PhotoFit, StepMetrics, ViewScore,
+};
 
 fn camera() -> Camera {
     Camera {
@@ -27,6 +29,8 @@ fn cloud(n: usize) -> GaussianCloud {
 }
 
 fn info() -> SceneInfo {
+    let exposure = Some(PhotoExposure { gain: [1.1, 0.9, 1.0 / 3.0], bias: [0.01, 0.0, -0.1] });
+    let fit = PhotoFit { name: "b.jpg".into(), moved: Some([0.1 + 0.2, 0.05]), exposure };
     SceneInfo {
         meters_per_unit: Some(0.5),
         state: None,
@@ -46,8 +50,10 @@ fn info() -> SceneInfo {
                 ssim: 1.0,
                 gaussians: 5,
                 views: vec![ViewScore { name: "a.jpg".into(), psnr: f64::INFINITY, ssim: 1.0 }],
+                fitted: None,
             }],
         },
+        photo_fits: vec![fit],
     }
 }
 

@@ -12,6 +12,7 @@ use strum::VariantArray;
 use self::forecast::InferenceEstimate;
 use super::JobError;
 use super::held_out::held_out;
+use super::refined::at_refined_poses;
 use crate::io::labels::Labels;
 use crate::io::trained::{self, CLOUD_FILE};
 use crate::io::{IoError, SceneFolder, semantic_map, splat_ply};
@@ -161,10 +162,11 @@ pub(crate) fn run(
         observer.note(Severity::Info, kept_text(&kept));
     }
     let (removed, removed_names) = gone(before.as_ref(), observer);
-    let cameras = trained::load_info(folder)?.cameras;
-    let held = held_out(dataset, &cameras, None, request.holdout_every);
+    let info = trained::load_info(folder)?;
+    let held = held_out(dataset, &info.cameras, None, request.holdout_every);
     let all = dataset.photos.iter().enumerate();
-    let photos: Vec<Photo> = all.filter(|(i, _)| !held.contains(i)).map(|(_, p)| p.clone()).collect();
+    let mut photos: Vec<Photo> = all.filter(|(i, _)| !held.contains(i)).map(|(_, p)| p.clone()).collect();
+    at_refined_poses(&mut photos, &info);
     let place = |name: &String| {
         if held.iter().any(|i| dataset.photos[*i].name == *name) {
             return Err(JobError::HeldOut(name.clone()));

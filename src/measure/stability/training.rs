@@ -145,6 +145,7 @@ fn resumed(faulty: bool) -> Finding {
             refinement: None,
             history: Default::default(),
             unreported: Default::default(),
+            fits: Vec::new(),
         };
         checkpoint::save(&scene, &half, &header).map_err(|e| broken(e.to_string()))?;
         let loaded = || -> Result<Trainer, Finding> {

@@ -26,7 +26,7 @@ const STILL_PX: f64 = 0.02;
 const LARGEST: [f64; 3] = [0.1, 0.15, 0.1];
 
 /// Curvature of a loss by the parameters of a pose.
-pub(super) type Curvature = [[f64; PARAMETERS]; PARAMETERS];
+pub(crate) type Curvature = [[f64; PARAMETERS]; PARAMETERS];
 
 /// A pose that a rendering was aligned at.
 pub(super) struct Aligned {
@@ -102,7 +102,7 @@ fn within(camera: Camera, start: &Camera, focal: FocalBounds) -> Camera {
 }
 
 /// Curvature of the loss, and the usual depth of what is seen.
-fn curvature(frame: &Frame<f32>, camera: &Camera, weights: &[Vec<f32>; 3]) -> (Curvature, f64) {
+pub(crate) fn curvature(frame: &Frame<f32>, camera: &Camera, weights: &[Vec<f32>; 3]) -> (Curvature, f64) {
     let width = frame.width_px;
     let depths = frame.expected_depth();
     let slopes = [0, 1, 2].map(|c| slopes(&frame.color[c], width));

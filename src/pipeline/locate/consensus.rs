@@ -141,7 +141,7 @@ fn fitted(matches: &[PointMatch], start: Camera, within_px: f64, with_focal: boo
 }
 
 /// Takes the focal length out of normal equations.
-pub(super) fn hold_focal(normal: &mut [[f64; PARAMETERS]; PARAMETERS], right: &mut [f64; PARAMETERS]) {
+pub(crate) fn hold_focal(normal: &mut [[f64; PARAMETERS]; PARAMETERS], right: &mut [f64; PARAMETERS]) {
     let focal = PARAMETERS - 1;
     for i in 0..PARAMETERS {
         (normal[i][focal], normal[focal][i]) = (0.0, 0.0);

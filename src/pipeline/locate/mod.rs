@@ -7,7 +7,8 @@
 //!    found. Three points give a pose ([`p3p`]), the one that most matches agree on is kept.
 //! 3. **Fine** ([`mod@align`], [`photometric`]): the colors are aligned, from small pictures to larger ones.
 //!
-//! [`mod@likeness`] then says how much of the photo the scene explains; a photo of something else is refused.
+//! [`mod@likeness`] then says how much of the photo the scene explains; a photo of something else is refused. A pose
+//! that is nearly right needs the third part alone ([`nearby`]).
 
 mod align;
 mod consensus;
@@ -17,6 +18,7 @@ mod gallery;
 mod gray;
 mod likeness;
 mod matching;
+mod nearby;
 mod p3p;
 mod photometric;
 mod pose;
@@ -26,15 +28,18 @@ use std::sync::Arc;
 
 use glam::DVec2;
 
-use self::align::{Aligned, Curvature, FocalBounds, STEPS, align};
+use self::align::{Aligned, FocalBounds, STEPS, align};
+pub(super) use self::align::{Curvature, curvature};
+pub(super) use self::consensus::hold_focal;
 use self::consensus::{Consensus, PointMatch, consensus};
 use self::descriptor::{PictureFeature, features};
 use self::gallery::{AlikeView, FEATURES_PX, Gallery, MOST_FEATURES};
 use self::gray::GrayPlane;
 use self::likeness::{Likeness, likeness};
 use self::matching::pairs;
+pub(crate) use self::nearby::PoseAligner;
 use self::photometric::{PhotoLevel, WIDTH};
-use self::pose::PARAMETERS;
+pub(super) use self::pose::{PARAMETERS, moved};
 use super::observer::{Interrupted, Observer};
 use crate::math::cholesky::inverse;
 use crate::render::{RenderError, RenderSettings};

@@ -6,13 +6,13 @@ use crate::math::rotation::nearest_rotation;
 use crate::scene::Camera;
 
 /// Parameters of a pose: three of the move (scene units), three of the turn (radians), one of the focal length.
-pub(super) const PARAMETERS: usize = 7;
+pub(crate) const PARAMETERS: usize = 7;
 
 /// A change of a pose.
-pub(super) type PoseStep = [f64; PARAMETERS];
+pub(crate) type PoseStep = [f64; PARAMETERS];
 
 /// The camera after a step.
-pub(super) fn moved(camera: &Camera, step: &PoseStep) -> Camera {
+pub(crate) fn moved(camera: &Camera, step: &PoseStep) -> Camera {
     let [x, y, z, a, b, c, focal] = *step;
     let turn = DMat3::from_quat(DQuat::from_scaled_axis(DVec3::new(a, b, c)));
     Camera {

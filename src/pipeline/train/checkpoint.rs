@@ -16,6 +16,7 @@ use sha2::{Digest, Sha256};
 use super::TrainConfig;
 use super::density::DensityStats;
 use super::inputs::TrainInputs;
+use super::photo_fits::StoredFit;
 use super::refine::Refinement;
 use super::trainer::Trainer;
 use super::window::StepWindow;
@@ -64,6 +65,9 @@ pub struct Header {
     /// Measurements since the last row of `history`; absent in files of earlier versions.
     #[serde(default)]
     pub unreported: StepWindow,
+    /// Poses and exposures learned so far, by photo; empty where none are learned.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub fits: Vec<StoredFit>,
 }
 
 /// Reasons for which a checkpoint cannot be used.
@@ -216,6 +220,7 @@ mod tests {
             refinement: None,
             history: History::default(),
             unreported: StepWindow::default(),
+            fits: Vec::new(),
         };
         save(&scene, &trainer, &header).expect("saved");
         let path = folder.path().join(FILE);

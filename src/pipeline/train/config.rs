@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use crate::io::trained::SCENE_FILE;
 use crate::pipeline::semantics::lifting::tracker::TrackOptions;
 use crate::render::{BackendChoice, RenderSettings};
-use crate::scene::{AlphaUse, Camera, Limits, SplatRenderMode};
+use crate::scene::{AlphaUse, Camera, FittedParts, Limits, SplatRenderMode};
 
 /// Weight of the normal loss for surfels (2DGS's).
 const SURFEL_NORMALS: f64 = 0.05;
@@ -56,6 +56,10 @@ pub struct TrainConfig {
     pub normal_weight: Option<f64>,
     /// Weight of the distortion loss, which concentrates surfels along rays; `None` = the default.
     pub distortion_weight: Option<f64>,
+    /// True if the poses of the training photos are refined; on the CPU.
+    pub refine_poses: bool,
+    /// True if every training photo has an exposure of its own; on the CPU.
+    pub exposure: bool,
 }
 
 /// Stored settings that cannot be read: defaults in their place would train or render something else.
@@ -109,7 +113,9 @@ impl TrainConfig {
             return bad("the weights of normals and distortion must be numbers, 0 or more");
         }
         if self.needs_cpu() && self.backend == BackendChoice::Gpu {
-            return bad("surfels and the term for normals train on the CPU only: choose --backend cpu");
+            return bad(
+                "surfels, the term for normals, --refine-poses and --exposure train on the CPU only: choose --backend cpu",
+            );
         }
         Ok(())
     }
@@ -145,7 +151,20 @@ impl TrainConfig {
 
     /// True if only the CPU supports these settings.
     pub(crate) fn needs_cpu(&self) -> bool {
-        self.surfels || self.geometry_weights().0 > 0.0
+        self.surfels || self.geometry_weights().0 > 0.0 || self.held_out_fit().is_some()
+    }
+
+    /// The reason for training on the CPU, if photos are fitted, for a note.
+    pub(super) fn why_cpu(&self) -> &'static str {
+        match self.held_out_fit() {
+            Some(_) => ": refined poses and exposures need it",
+            None => "",
+        }
+    }
+
+    /// What is fitted of a held-out photo before it is scored a second time: as much as of the training photos.
+    pub(crate) fn held_out_fit(&self) -> Option<FittedParts> {
+        FittedParts { pose: self.refine_poses, exposure: self.exposure }.some()
     }
 
     /// Render settings of the trained scene in front of `background`, black if unknown, at this scene extent (see
@@ -191,6 +210,8 @@ impl Default for TrainConfig {
             surfels: false,
             normal_weight: None,
             distortion_weight: None,
+            refine_poses: false,
+            exposure: false,
         }
     }
 }

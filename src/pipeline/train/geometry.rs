@@ -1,9 +1,9 @@
 //! Geometry losses: consistency of normals with depth, and distortion of surfels along each ray (2DGS).
 
-use super::{TrainConfig, TrainView};
+use super::TrainConfig;
 use crate::render::normals::{self, SurfaceDepth};
 use crate::render::{Features, Frame, FrameGradient};
-use crate::scene::GaussianCloud;
+use crate::scene::{Camera, GaussianCloud};
 
 /// Fraction of a run after which the distortion loss is active (2DGS: step 3,000 of 30,000).
 const DISTORTION_FROM: f64 = 0.1;
@@ -51,11 +51,11 @@ impl GeometryLoss {
     }
 
     /// Extra channels to render at `step`.
-    pub(crate) fn features(&mut self, cloud: &GaussianCloud, view: &TrainView, step: u64) -> Features<'_, f32> {
+    pub(crate) fn features(&mut self, cloud: &GaussianCloud, camera: &Camera, step: u64) -> Features<'_, f32> {
         if !self.draws_normals(step) {
             return Features::NONE;
         }
-        normals::of_gaussians(cloud, &view.camera, &mut self.values);
+        normals::of_gaussians(cloud, camera, &mut self.values);
         Features { channels: 3, values: &self.values }
     }
 
@@ -63,7 +63,7 @@ impl GeometryLoss {
     pub(crate) fn compare(
         &mut self,
         frame: &Frame<f32>,
-        view: &TrainView,
+        camera: &Camera,
         step: u64,
         gradient: &mut FrameGradient<f32>,
     ) -> f64 {
@@ -84,7 +84,7 @@ impl GeometryLoss {
             if let [x, y, z] = drawn {
                 let own = &mut self.d_normals;
                 let depth = if self.surfels { SurfaceDepth::Median } else { SurfaceDepth::Expected };
-                loss += normals::consistency(frame, [x, y, z], &view.camera, depth, weight, gradient, own);
+                loss += normals::consistency(frame, [x, y, z], camera, depth, weight, gradient, own);
                 if self.surfels {
                     std::mem::swap(&mut gradient.normals, own);
                 } else {

@@ -5,6 +5,7 @@ use std::sync::Arc;
 use super::checkpoint::CheckpointError;
 use crate::io::IoError;
 use crate::math::finite::NotFinite;
+use crate::pipeline::locate::LocateError;
 use crate::pipeline::observer::{Evaluation, Interrupted};
 use crate::render::{GpuError, RenderError};
 use crate::scene::GaussianCloud;
@@ -55,6 +56,8 @@ pub enum TrainError {
     /// A stage left a value that is not finite; checked under `debug-validation` only.
     #[error(transparent)]
     NotFinite(#[from] NotFinite),
+    #[error("held-out photos: {0}")]
+    Fit(LocateError),
     #[error("{0}")]
     Config(String),
     #[error("canceled")]

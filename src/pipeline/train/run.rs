@@ -1,6 +1,5 @@
 //! Training job: from photos to a trained scene, with progress, checkpoints and held-out scores.
 
-use std::collections::VecDeque;
 use std::path::Path;
 use std::sync::Arc;
 use std::time::Instant;
@@ -10,9 +9,12 @@ use rand_pcg::Pcg64Mcg;
 
 use super::checkpoint::{self, Checkpoint, Header};
 use super::device::StepResult;
+use super::divergence::LossGuard;
+use super::fit_report;
 use super::folder::{FolderUse, claim, finished, objects_for, remade, resumable};
 use super::inputs::{Compare, TrainInputs};
 use super::outcome::{TrainEnd, TrainError, TrainOutcome};
+use super::photo_fits::PhotoFits;
 use super::photos::{before_backdrop, load_training, load_views, tell_marks, tell_of_pixels};
 use super::trainer::{REPORT_STEPS, StepError, Trainer};
 use super::window::StepWindow;
@@ -20,16 +22,14 @@ use super::{TrainConfig, TrainView, coarse, density, geometry, init, refine};
 use crate::io::SceneFolder;
 use crate::io::trained::{History, SceneInfo};
 use crate::math::format::count;
-use crate::math::stats::median;
 use crate::pipeline::evaluate::scores;
+use crate::pipeline::evaluate_fitted::fitted;
 use crate::pipeline::observer::{Evaluation, Observer, Severity, Ticker};
 use crate::render::Device;
 use crate::scene::{Dataset, GaussianCloud};
 
 /// Training steps between copies of the cloud for a rollback.
 const SAFE_STEPS: u64 = 500;
-/// Multiple of the running median from which a loss counts as divergence.
-const DIVERGED: f64 = 10.0;
 /// Most rollbacks of a run before it fails.
 const MAX_ROLLBACKS: u32 = 4;
 
@@ -96,7 +96,7 @@ pub(crate) fn run_on(
             observer.note(Severity::Info, format!("Training on {}", device.describe()));
             job.trainer.move_to(device, job.coarse.as_ref().unwrap_or(&job.views))?;
         }
-        None => observer.note(Severity::Info, "Training on the CPU".into()),
+        None => observer.note(Severity::Info, format!("Training on the CPU{}", config.why_cpu())),
     }
     let end = job.train(observer)?;
     job.finish(end, observer)
@@ -123,7 +123,7 @@ struct Job<'a> {
     unreported: StepWindow,
     safe: GaussianCloud,
     rollbacks: u32,
-    recent: VecDeque<f64>,
+    guard: LossGuard,
     /// Gradients clipped since the last report of them.
     outliers: u64,
     /// True if the last checkpoint could not be saved.
@@ -142,6 +142,8 @@ impl<'a> Job<'a> {
         let (extent, background) = (dataset.camera_extent().1, dataset.background.unwrap_or([0.0; 3]));
         let mut rng = Pcg64Mcg::seed_from_u64(config.seed);
         let (mut secs, mut history, mut unreported) = (0.0, History::default(), StepWindow::default());
+        let mut fits = PhotoFits::new(config, &views, &vec![true; views.len()], extent);
+        fits.restore(saved.as_ref().map_or(&[], |s| &s.header.fits), &views);
         // More steps mean more coarse steps; a run that already trained at full size does not go back.
         let was_coarse = saved.as_ref().is_none_or(|s| s.header.step < coarse::steps(&s.header.config));
         let mut trainer = match saved {
@@ -164,7 +166,7 @@ impl<'a> Job<'a> {
                 t
             }
         };
-        trainer.cloud.render_mode = config.render_mode();
+        (trainer.fits, trainer.cloud.render_mode) = (fits, config.render_mode());
         if dataset.background.is_none() {
             trainer.before_random_colors();
         }
@@ -190,7 +192,7 @@ impl<'a> Job<'a> {
             unreported,
             safe,
             rollbacks: 0,
-            recent: VecDeque::new(),
+            guard: LossGuard::default(),
             outliers: 0,
             unsaved: false,
         }
@@ -273,13 +275,13 @@ impl<'a> Job<'a> {
                 let count = std::mem::take(&mut self.outliers);
                 observer.note(Severity::Info, format!("{count} gradients were far above what is usual, and were cut"));
             }
-            if self.diverges(result.loss) {
+            if self.guard.diverges(result.loss, self.trainer.step) {
                 self.roll_back(result.loss, observer)?;
                 return Ok(results);
             }
         }
         if self.trainer.control_density().map_err(|e| self.failed(e))?.is_some() {
-            self.recent.clear();
+            self.guard.clear();
         }
         if self.trainer.step % SAFE_STEPS == 0 {
             self.trainer.fetch_cloud()?;
@@ -296,20 +298,6 @@ impl<'a> Job<'a> {
         }
     }
 
-    /// Returns whether this loss is not finite or far above the recent losses.
-    fn diverges(&mut self, loss: f64) -> bool {
-        self.recent.push_back(loss);
-        if self.recent.len() > 200 {
-            self.recent.pop_front();
-        }
-        let usual = if self.recent.len() >= 100 && self.trainer.step % 20 == 0 {
-            median(&self.recent.iter().copied().collect::<Vec<_>>())
-        } else {
-            f64::INFINITY
-        };
-        !loss.is_finite() || loss > DIVERGED * usual
-    }
-
     fn roll_back(&mut self, loss: f64, observer: &mut dyn Observer) -> Result<(), TrainError> {
         self.rollbacks += 1;
         if self.rollbacks > MAX_ROLLBACKS {
@@ -321,7 +309,7 @@ impl<'a> Job<'a> {
         );
         observer.note(Severity::Warning, text);
         self.trainer.roll_back(self.safe.clone())?;
-        self.recent.clear();
+        self.guard.clear();
         Ok(())
     }
 
@@ -335,7 +323,12 @@ impl<'a> Job<'a> {
             StepError::Render(e) => TrainError::Render("held-out".into(), e),
             e => self.failed(e),
         })?;
-        let e = Evaluation::of(scores, count, self.trainer.step, self.secs);
+        let mut e = Evaluation::of(scores, count, self.trainer.step, self.secs);
+        if self.trainer.step >= self.config.steps {
+            let (cloud, settings) = (self.trainer.cloud.clone(), self.trainer.render_settings());
+            e.fitted = fitted(Arc::new(cloud), &settings, &self.tests, self.config.held_out_fit(), observer)
+                .map_err(TrainError::Fit)?;
+        }
         self.history.evaluations.push(e.clone());
         observer.evaluation(e);
         Ok(())
@@ -364,6 +357,7 @@ impl<'a> Job<'a> {
             refinement: t.refinement.clone(),
             history: self.history.clone(),
             unreported: self.unreported.clone(),
+            fits: t.fits.stored(&self.views),
         };
         checkpoint::save(scene, t, &header).map_err(TrainError::Save)
     }
@@ -374,6 +368,8 @@ impl<'a> Job<'a> {
         let scored = self.history.evaluations.last().is_some_and(|e| e.step == self.trainer.step);
         // An error of the evaluation is returned after the scene is saved.
         let evaluated = if end == TrainEnd::Finished && !scored { self.evaluate(observer) } else { Ok(()) };
+        fit_report::tell(&self.trainer.fits, &self.views, observer);
+        fit_report::store(&self.trainer.fits, &self.views, &mut self.info);
         if let Some(scene) = &self.scene {
             self.info.history = self.history.clone();
             let step = self.trainer.step; // of a stopped training, too

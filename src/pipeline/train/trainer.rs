@@ -8,6 +8,7 @@ use super::density::{self, DensityReport, DensityRound, DensityStats};
 use super::device::{DeviceRun, LAMBDA, StepResult};
 use super::geometry::GeometryLoss;
 use super::optimizer::{StepStats, Update};
+use super::photo_fits::{FitStep, PhotoFits};
 use super::refine::{self, Refinement};
 use super::schedule::Schedule;
 use super::{TrainConfig, TrainView};
@@ -70,6 +71,8 @@ pub struct Trainer {
     losses: [PhotoLoss<f32>; 3],
     gradient: FrameGradient<f32>,
     geometry: GeometryLoss,
+    /// Poses and exposures that are learned.
+    pub(crate) fits: PhotoFits,
     device: Option<DeviceRun>,
 }
 
@@ -95,6 +98,7 @@ impl Trainer {
             losses: Default::default(),
             gradient: FrameGradient::default(),
             geometry: GeometryLoss::new(config, extent),
+            fits: PhotoFits::default(),
             device: None,
             cloud,
         }
@@ -186,13 +190,20 @@ impl Trainer {
             self.step += 1;
             return Ok(if self.step % REPORT_STEPS == 0 { device.results()? } else { Vec::new() });
         }
-        let settings = RenderSettings { depth: self.geometry.counts(self.step), background, ..self.settings.clone() };
-        let features = self.geometry.features(&self.cloud, view, self.step);
-        let frame = self.renderer.render(&self.cloud, features, &view.camera, &settings)?;
-        if settings.depth {
-            self.geometry.compare(&frame, view, self.step, &mut self.gradient);
+        let at = FitStep { photo: i, step: self.step, background };
+        let camera = &*self.fits.camera(i, &view.camera);
+        let geometry = self.geometry.counts(self.step);
+        let settings = RenderSettings { depth: geometry || self.fits.moves(at), background, ..self.settings.clone() };
+        let features = self.geometry.features(&self.cloud, camera, self.step);
+        let mut frame = self.renderer.render(&self.cloud, features, camera, &settings)?;
+        if geometry {
+            self.geometry.compare(&frame, camera, self.step, &mut self.gradient);
+        } else {
+            self.gradient.alpha.clear();
         }
-        let parts = self.compare(frame.color, view, shift);
+        let colors = self.fits.colors(at, &frame).unwrap_or_else(|| std::mem::take(&mut frame.color));
+        let parts = self.compare(colors, view, shift);
+        self.fits.learn_exposure(at, &frame, &mut self.gradient);
         self.renderer.backward_tiles(&self.gradient);
         if CHECKED {
             all_finite("the loss", "part", &[parts.l1, parts.ssim, parts.mse])?;
@@ -200,7 +211,8 @@ impl Trainer {
             planes.try_for_each(|p| all_finite("the loss", "the gradient of pixel", p))?;
             self.renderer.check_backward()?;
         }
-        let update = self.update(&view.camera);
+        self.fits.learn_pose(at, camera, &frame, &self.renderer, &self.cloud);
+        let update = self.update(camera);
         let StepStats { skipped, outliers, first } =
             update.apply(&self.renderer, &mut self.cloud, &mut self.moments, &mut self.stats);
         self.step += 1;
@@ -267,6 +279,7 @@ impl Trainer {
                 }
             }
         }
+        self.fits.weigh(&rendered, &target, coverage);
         let width = view.camera.width_px as usize;
         let mut sum = LossParts::default();
         for c in 0..3 {

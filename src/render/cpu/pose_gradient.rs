@@ -35,7 +35,12 @@ impl<R: Real> CpuRenderer<R> {
         gradient: &FrameGradient<R>,
     ) -> PoseGradient {
         self.backward_tiles(gradient);
-        let (renderer, n) = (&*self, cloud.len());
+        self.pose_gradient_of_tiles(cloud, camera)
+    }
+
+    /// The same after [`Self::backward_tiles`], while the cloud is still as it was drawn.
+    pub(crate) fn pose_gradient_of_tiles(&self, cloud: &GaussianCloud<R>, camera: &Camera) -> PoseGradient {
+        let (renderer, n) = (self, cloud.len());
         let part = |first: usize| {
             let own = (first..(first + TASK).min(n)).filter_map(|i| renderer.share(cloud, camera, i));
             own.fold(PoseGradient::default(), PoseGradient::plus)

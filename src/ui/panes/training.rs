@@ -173,6 +173,11 @@ fn settings(ui: &mut Ui, config: &mut TrainConfig, largest_px: u32) {
     });
     ui.collapsing("Advanced", |ui| {
         ui.checkbox(&mut config.antialias, "Anti-aliasing (2-D filter of Mip-Splatting)");
+        let tip = "For poses that are a little off, as those of phones and of video are. The drift is told at the end; on \
+                   the CPU.";
+        ui.checkbox(&mut config.refine_poses, "Refine the photos' poses").on_hover_text(tip);
+        let tip = "For photos that differ in brightness or white balance; on the CPU.";
+        ui.checkbox(&mut config.exposure, "Learn the photos' exposures").on_hover_text(tip);
         ui.horizontal(|ui| {
             let tip = "Meaning of the photos' transparent pixels: ignored, empty space around a cut-out object, or the \
                        background's color.";

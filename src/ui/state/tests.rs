@@ -115,7 +115,7 @@ fn a_resumed_run_overwrites_the_steps_it_repeats() {
 fn a_new_run_starts_its_plot_over_and_a_resumed_one_goes_on() {
     let evaluation = |step| {
         let views = Vec::new();
-        Event::Evaluation(JOB, Evaluation { step, secs: 1.0, psnr: 20.0, ssim: 0.5, gaussians: 9, views })
+        Event::Evaluation(JOB, Evaluation { step, secs: 1.0, psnr: 20.0, ssim: 0.5, gaussians: 9, views, fitted: None })
     };
     let mut s = fold([started(Makes::Gaussians), step(10), step(20), evaluation(20), canceled(JOB)]);
     s.apply(started(Makes::Gaussians));

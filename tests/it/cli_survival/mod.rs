@@ -83,6 +83,33 @@ fn a_killed_training_goes_on_from_its_last_checkpoint_to_the_same_result() {
 }
 
 #[test]
+fn a_killed_training_keeps_refined_poses_and_exposures() {
+    let folder = folder();
+    let photos = tiny_dataset(folder.path());
+    let photos = photos.to_str().unwrap();
+    let at = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
+    let (out, straight, plain) = (at("killed"), at("straight"), at("plain"));
+    let arguments =
+        |out: &str| [&train_arguments(photos, out, "1200")[..], &["--refine-poses", "--exposure"]].concat().join(" ");
+    let train = |line: &str| fmlgs(&line.split(' ').collect::<Vec<_>>()).ok();
+    let mut child = start(&arguments(&out).split(' ').collect::<Vec<_>>());
+    wait_for_checkpoints(&mut child, &Path::new(&out).join("checkpoint.bin"), 3);
+    send(&child, "-KILL");
+    child.wait().unwrap();
+    assert!(train(&arguments(&out)).stderr.contains("Continuing at step"));
+    let told = train(&arguments(&straight));
+    assert!(told.stderr.contains("Refined poses moved by") && told.stderr.contains("Exposures:"), "{}", told.stderr);
+    let load = |scene: &str| fmlgs::io::trained::load(Path::new(scene)).unwrap();
+    let (resumed, whole) = (load(&out), load(&straight));
+    assert!(resumed.cloud == whole.cloud && resumed.info.cameras == whole.info.cameras);
+    assert_eq!(resumed.info.photo_fits, whole.info.photo_fits);
+    // The controls: poses moved, and without the options nothing is stored of photos.
+    fmlgs(&train_arguments(photos, &plain, "1200")).ok();
+    let plain = load(&plain).info;
+    assert!(plain.cameras != whole.info.cameras && plain.photo_fits.is_empty() && !whole.info.photo_fits.is_empty());
+}
+
+#[test]
 fn ctrl_c_saves_and_exits_with_130() {
     let folder = folder();
     let photos = tiny_dataset(folder.path());
