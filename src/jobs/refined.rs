@@ -33,7 +33,7 @@ mod tests {
             photo_fits: vec![fit("a", Some([1.0, 0.1])), fit("b", None), fit("gone", Some([1.0, 0.1]))],
             ..SceneInfo::default()
         };
-        let mut photos = ["a", "b", "c"].map(|n| Photo::new(n, n.into(), camera(0.0)));
+        let mut photos = ["a", "b", "c"].map(|n| Photo::new(n, n, camera(0.0)));
         at_refined_poses(&mut photos, &info);
         assert_eq!(photos.map(|p| p.camera), [camera(0.1), camera(0.0), camera(0.0)]);
     }

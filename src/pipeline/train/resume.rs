@@ -40,6 +40,7 @@ pub(crate) fn begin_refinement(
         refinement: Some(refinement),
         history,
         unreported: StepWindow::default(),
+        fits: Vec::new(),
     };
     checkpoint::save(scene, &Trainer::new(cloud, config, [0.0; 3], 1.0, rng), &header)
 }
