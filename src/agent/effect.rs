@@ -5,6 +5,7 @@ use std::sync::Arc;
 use glam::DVec3;
 
 use crate::jobs::go_to::Explored;
+use crate::jobs::locate::LocatedPhoto;
 use crate::navigate::CameraTrajectory;
 use crate::scene::IdentityId;
 
@@ -24,6 +25,8 @@ pub enum Effect {
     Renamed(IdentityId, String),
     /// The changes of the last request were undone.
     Undone(UndoneRequest),
+    /// A photo was located, after the flight there; with `true`, its difference from the scene is to be shown.
+    Located(Box<LocatedPhoto>, bool),
     /// The occupied space of the scene was computed.
     Explored(Arc<Explored>),
 }

@@ -1,11 +1,15 @@
 //! Execution of a planned call: permission, target, facts of the scene and confirmation are checked, then the
 //! [`World`] acts. The calls of every planner pass here, and only here.
 
+use std::sync::atomic::AtomicBool;
+
 use super::camera_args::{Distance, NORMAL};
 use super::describe::{self, SEEN, length, the};
 use super::dialog::DialogState;
 use super::listing::{list_ids, measure, say_list};
-use super::policy::{Permission, Policy};
+use super::objection::{conflict, question};
+use super::photo_answer;
+use super::policy::Policy;
 use super::refusal::{Refusal, RefusalKind};
 use super::resolve::{Resolved, resolve};
 use super::tool::{Reference, Target, ToolCall};
@@ -30,7 +34,10 @@ impl CallOutcome {
     pub(crate) fn is_private(&self) -> bool {
         match self.refused {
             Some(kind) => kind == RefusalKind::Failed,
-            None => matches!(self.call, ToolCall::Export { .. }),
+            // A chat model gets neither files nor cameras.
+            None => {
+                matches!(self.call, ToolCall::Export { .. } | ToolCall::LocatePhoto { .. } | ToolCall::ShowChanges {})
+            }
         }
     }
 
@@ -38,7 +45,8 @@ impl CallOutcome {
     pub(crate) fn heard(&self) -> &str {
         match self.refused {
             _ if !self.is_private() => &self.text,
-            None => "It is written to a file; the user is told which.",
+            None if matches!(self.call, ToolCall::Export { .. }) => "It is written to a file; the user is told which.",
+            None => "The photo is found, and shown to the user, who is told where it was taken.",
             Some(_) => "It failed on the user's machine; the user is told why.",
         }
     }
@@ -186,47 +194,6 @@ fn choices(world: &dyn World, candidates: &[IdentityId]) -> String {
     }
 }
 
-/// Refusal of a call that conflicts with the facts of the scene.
-fn conflict(world: &dyn World, call: &ToolCall, id: Option<IdentityId>) -> Option<Refusal> {
-    let id = id?;
-    let facts = world.facts(id)?;
-    let it = the(world, id);
-    let text = match call {
-        ToolCall::Hide { .. } if facts.hidden => format!("{} is hidden already.", capital(&it)),
-        ToolCall::Unhide { .. } if !facts.hidden => format!("{} is not hidden.", capital(&it)),
-        ToolCall::Rename { name, .. } if !name.chars().any(char::is_alphanumeric) => {
-            return Some(Refusal::new(RefusalKind::Unclear, "A name needs at least one letter or digit."));
-        }
-        ToolCall::Rename { name, .. } if facts.names.first() == Some(name) => format!("It is called '{name}' already."),
-        ToolCall::GoTo { .. } | ToolCall::LookAt { .. } | ToolCall::Measure { .. } | ToolCall::Export { .. }
-            if facts.bounds.is_none() =>
-        {
-            format!("{} has no Gaussians in this scene, only a name.", capital(&it))
-        }
-        _ => return None,
-    };
-    Some(Refusal::new(RefusalKind::Conflict, text))
-}
-
-/// Question that the user must confirm before the call.
-fn question(world: &dyn World, call: &ToolCall, policy: &Policy, id: Option<IdentityId>) -> Option<String> {
-    let permission = policy.permission(call.name());
-    let it = id.map(|id| the(world, id)).unwrap_or_default();
-    match (permission, call) {
-        (Permission::ConfirmOverwrite, ToolCall::Export { .. }) => {
-            let path = id.and_then(|id| world.export_replaces(id))?;
-            Some(format!("Exporting {it} would replace {path}. Continue? (yes or no)"))
-        }
-        (Permission::ConfirmOverwrite | Permission::Free | Permission::Never, _) => None,
-        (Permission::Confirm, ToolCall::Remove { .. }) => {
-            Some(format!("Make a copy of this scene without {it}? (yes or no)"))
-        }
-        (Permission::Confirm, ToolCall::Rename { name, .. }) => Some(format!("Rename {it} to '{name}'? (yes or no)")),
-        (Permission::Confirm, ToolCall::AskUser { .. }) => None,
-        (Permission::Confirm, other) => Some(format!("{}: continue? (yes or no)", other.line(world.identities()))),
-    }
-}
-
 /// Executes a checked call and updates the dialog.
 pub(crate) fn perform(
     world: &mut dyn World,
@@ -234,12 +201,13 @@ pub(crate) fn perform(
     ids: Vec<IdentityId>,
     note: &str,
     dialog: &mut DialogState,
+    cancel: &AtomicBool,
 ) -> CallOutcome {
     let id = ids.first().copied().unwrap_or(NO_IDENTITY);
     let mut listed = Vec::new();
     let done = match ids.as_slice() {
         [_, _, ..] if marks(&call) => mark_all(world, &ids, dialog, &mut listed),
-        _ => act(world, &call, id, ids.get(1).copied(), dialog, &mut listed),
+        _ => act(world, &call, id, ids.get(1).copied(), dialog, &mut listed, cancel),
     };
     if done.is_ok() && matches!(call, ToolCall::Move { .. } | ToolCall::Turn { .. } | ToolCall::GoTo { .. }) {
         dialog.moved = Some(call.clone());
@@ -288,6 +256,7 @@ fn act(
     other: Option<IdentityId>,
     dialog: &mut DialogState,
     listed: &mut Vec<IdentityId>,
+    cancel: &AtomicBool,
 ) -> Result<String, Refusal> {
     let failed = |e: WorldError| Refusal::new(RefusalKind::Failed, capital(&e.0));
     let it = if id == NO_IDENTITY { String::new() } else { the(world, id) };
@@ -387,6 +356,8 @@ fn act(
         ToolCall::Measure { to, .. } => measure(world, id, to.as_ref(), other)?,
         ToolCall::AskUser { question, .. } => question.clone(),
         ToolCall::Undo {} => format!("Undone: {}.", world.undo().map_err(failed)?),
+        ToolCall::LocatePhoto { photo } => photo_answer::taken(world, photo.as_deref(), cancel).map_err(failed)?,
+        ToolCall::ShowChanges {} => photo_answer::changed(world, cancel).map_err(failed)?,
         ToolCall::Export { .. } => format!("{} is written to {}.", capital(&it), world.export(id).map_err(failed)?),
     })
 }

@@ -28,6 +28,8 @@ mod listing;
 pub mod llm;
 pub mod mcp;
 pub(crate) mod names;
+mod objection;
+mod photo_answer;
 pub mod planner;
 pub(crate) mod policy;
 pub(crate) mod refusal;

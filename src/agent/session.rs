@@ -323,7 +323,7 @@ impl Session {
     ) -> CallOutcome {
         let said = call.line(world.identities());
         (sink.on)(AgentEvent::Call { call: call.clone(), line: said.clone() });
-        let outcome = perform(world, call, ids, note, &mut self.dialog);
+        let outcome = perform(world, call, ids, note, &mut self.dialog, sink.cancel);
         let done = outcome.refused.is_none();
         (sink.on)(AgentEvent::Result { text: outcome.text.clone(), done });
         self.transcript.add(What::Result { call: outcome.call.clone(), line: said, text: outcome.text.clone(), done });

@@ -118,6 +118,14 @@ pub enum ToolCall {
     Export {
         target: Target,
     },
+    /// Find where a photo was taken, and go there.
+    LocatePhoto {
+        /// File of the photo; `None` for the last one.
+        #[serde(default)]
+        photo: Option<String>,
+    },
+    /// Show the difference of the last photo from the scene.
+    ShowChanges {},
 }
 
 /// Reference of a distance.
@@ -140,7 +148,7 @@ pub enum ToolError {
 }
 
 /// Names of all tools, in the order of [`ToolCall`].
-pub const NAMES: [&str; 18] = [
+pub const NAMES: [&str; 20] = [
     "locate",
     "go_to",
     "look_at",
@@ -159,6 +167,8 @@ pub const NAMES: [&str; 18] = [
     "ask_user",
     "undo",
     "export",
+    "locate_photo",
+    "show_changes",
 ];
 
 /// Pattern of the calls that always have a target.
@@ -230,6 +240,7 @@ impl ToolCall {
                 Self::Rename { name, .. } => Some(name),
                 Self::AskUser { question, .. } => Some(question),
                 Self::List { named, .. } => named.as_ref(),
+                Self::LocatePhoto { photo } => photo.as_ref(),
                 _ => None,
             },
             match self.target() {

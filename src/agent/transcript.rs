@@ -161,6 +161,7 @@ impl ToolCall {
             Self::Measure { to: Some(Reference::Eye), .. } => parts.push("from here".into()),
             Self::Measure { to: Some(Reference::Thing(t)), .. } => parts.push(format!("from {}", name(t))),
             Self::AskUser { question, .. } => parts.push(format!("\"{question}\"")),
+            Self::LocatePhoto { photo } => parts.extend(photo.iter().map(|file| format!("\"{file}\""))),
             _ => {}
         }
         format!("{}({})", self.name(), parts.join(", "))

@@ -49,6 +49,7 @@ pub(super) struct ViewShares(Mutex<Option<Counted>>);
 /// Shares by identity, with their view.
 struct Counted {
     eye: Pose,
+    aspect: f64,
     hidden: Vec<bool>,
     shares: Vec<f64>,
 }
@@ -57,9 +58,9 @@ impl ViewShares {
     /// Share of the view from `eye` that an identity covers, parts included; 0 for an unknown one.
     pub(crate) fn of(&self, parts: &AgentScene, eye: Pose, aspect: f64, hidden: &[bool], id: IdentityId) -> f64 {
         let mut known = self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        let is_new = known.as_ref().is_none_or(|k| k.eye != eye || k.hidden != hidden);
+        let is_new = known.as_ref().is_none_or(|k| k.eye != eye || k.aspect != aspect || k.hidden != hidden);
         if is_new {
-            *known = Some(Counted { eye, hidden: hidden.to_vec(), shares: count(parts, eye, aspect, hidden) });
+            *known = Some(Counted { eye, aspect, hidden: hidden.to_vec(), shares: count(parts, eye, aspect, hidden) });
         }
         known.as_ref().and_then(|k| k.shares.get(id as usize)).copied().unwrap_or(0.0)
     }

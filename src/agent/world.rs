@@ -1,6 +1,10 @@
 //! Interface of the agent to the scene. The window, the command line and tests implement it; everything without a
 //! camera or a file is in [`super::resolve`] and [`super::describe`].
 
+use std::sync::atomic::AtomicBool;
+
+use glam::DVec3;
+
 use super::camera_args::{Direction, Distance};
 use super::relation::Viewpoint;
 use crate::jobs::query::ask_with;
@@ -49,6 +53,19 @@ pub struct Unreachable {
 pub struct Movement {
     pub distance_done: f64,
     pub stopped_by_obstacle: bool,
+}
+
+/// A photo that was located.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PhotoSight {
+    /// Name of the file.
+    pub name: String,
+    /// Place of the camera, in scene units.
+    pub center: DVec3,
+    /// Standard deviations of place and direction, in words, if they are known.
+    pub deviation: Option<String>,
+    /// Share of the photo that the scene explains, 0 to 1.
+    pub explained: f64,
 }
 
 /// Error of the scene, in plain words.
@@ -125,6 +142,17 @@ pub trait World {
 
     /// Writes the Gaussians of an identity to a file and returns its path.
     fn export(&mut self, id: IdentityId) -> Result<String, WorldError>;
+
+    /// Locates the photo of this file, goes to where it was taken and compares it with the view. Without a name, it is
+    /// the last photo that was spoken of or given. `cancel` stops the search.
+    fn locate_photo(&mut self, _photo: Option<&str>, _cancel: &AtomicBool) -> Result<PhotoSight, WorldError> {
+        Err(WorldError("photos cannot be located here".into()))
+    }
+
+    /// Shows the difference of the last photo from the scene, from where it was taken.
+    fn show_changes(&mut self, _cancel: &AtomicBool) -> Result<PhotoSight, WorldError> {
+        Err(WorldError("there is no photo to compare with".into()))
+    }
 
     /// Path of the file that [`Self::export`] would replace, if it exists.
     fn export_replaces(&self, id: IdentityId) -> Option<String>;

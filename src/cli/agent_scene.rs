@@ -8,10 +8,11 @@ use super::recipe::RecipeArgs;
 use super::scene_args::open_scene;
 use super::{CliError, number, view};
 use crate::agent::Policy;
-use crate::agent::scene::{AgentScene, Effect, SceneWorld};
+use crate::agent::scene::{AgentScene, Effect, ScenePhotos, SceneWorld};
 use crate::agent::transcript::Transcript;
 use crate::io::trained::SceneCamera;
 use crate::jobs::export;
+use crate::jobs::locate::kept::PhotoLocator;
 use crate::navigate::Pose;
 use crate::pipeline::semantics::query::recipe::QueryConfig;
 use crate::scene::Camera;
@@ -82,6 +83,8 @@ impl AgentSceneArgs {
         let map = scene.semantics()?;
         let lines = self.recipe.lines(&map);
         let camera = view::choose(self.from.as_deref(), &scene)?;
+        let has_cameras = !scene.cameras.is_empty() || scene.dataset_path.is_some();
+        let locator = has_cameras.then(|| PhotoLocator::new(scene.clone()));
         let parts = AgentScene {
             cameras: scene.views(),
             up: scene.home().up,
@@ -101,7 +104,8 @@ impl AgentSceneArgs {
         };
         let aspect = f64::from(camera.width_px) / f64::from(camera.height_px);
         let world = SceneWorld::new(parts, Pose::of(&camera), aspect, emit);
-        let world = world.map_err(|e| CliError::failed(e.to_string()))?;
+        let mut world = world.map_err(|e| CliError::failed(e.to_string()))?;
+        world.photos = ScenePhotos { locator, ..ScenePhotos::default() };
         Ok(AgentStage { world, work, camera, cameras: scene.cameras, lines })
     }
 

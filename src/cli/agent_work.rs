@@ -52,6 +52,10 @@ impl SceneWork {
             }
             Effect::Mark(ids) => format!("marks {} of them", ids.len()),
             Effect::Hidden(ids) => hides(ids),
+            Effect::Located(photo, differs) => {
+                let what = if *differs { "shows the difference from" } else { "compares the view with" };
+                format!("{what} {}", photo.name())
+            }
             Effect::Renamed(id, name) => self.renamed(*id, name),
             Effect::Undone(undone) => {
                 let names = undone.names.iter().map(|(id, name)| self.rename_undone(*id, name));

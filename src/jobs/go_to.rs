@@ -88,8 +88,7 @@ pub struct ApproachRequest {
 /// Finds the flight to an identity. Returns the prepared scene, too.
 pub(crate) fn visit(request: ApproachRequest) -> (Arc<Explored>, Approached) {
     let ApproachRequest { explored, cloud, cameras, up, settings, map, id, preference, from, aspect, frames } = request;
-    let known = explored.filter(|e| Arc::ptr_eq(&e.cloud, &cloud));
-    let explored = known.unwrap_or_else(|| Arc::new(Explored::new(Arc::clone(&cloud), &cameras, up)));
+    let explored = prepared(explored, Arc::clone(&cloud), &cameras, up);
     let place = SceneRef { cloud: &cloud, settings: &settings, map: &map };
     let name = map.identities.full_name(id);
     let visit = match explored.navigator.visit(place, id, preference, &from, aspect, frames) {
@@ -100,6 +99,40 @@ pub(crate) fn visit(request: ApproachRequest) -> (Arc<Explored>, Approached) {
         Err(e) => Approached { name, flight: None, problem: Some(e.to_string()) },
     };
     (explored, visit)
+}
+
+/// Request of a flight from one pose to another.
+#[derive(Clone, Debug)]
+pub(crate) struct FlightRequest {
+    /// The prepared scene, if there is one.
+    pub(crate) explored: Option<Arc<Explored>>,
+    pub(crate) cloud: Arc<GaussianCloud>,
+    pub(crate) cameras: Vec<Camera>,
+    pub(crate) up: DVec3,
+    pub(crate) from: Pose,
+    pub(crate) to: Pose,
+    pub(crate) frames: usize,
+}
+
+/// Finds the flight to a pose: around what is in the way, or else straight. Returns the prepared scene, too.
+pub(crate) fn fly_to_pose(request: FlightRequest) -> (Arc<Explored>, Option<CameraTrajectory>) {
+    let FlightRequest { explored, cloud, cameras, up, from, to, frames } = request;
+    let explored = prepared(explored, cloud, &cameras, up);
+    let legs = [from.center, to.center];
+    let straight = || CameraTrajectory::new(&legs, [&from, &to], None, None, frames, Speed::Eased);
+    let flight = explored.fly(&from, &to, frames).ok().or_else(straight);
+    (explored, flight)
+}
+
+/// The prepared scene, if it is of these Gaussians; else it is prepared now.
+fn prepared(
+    explored: Option<Arc<Explored>>,
+    cloud: Arc<GaussianCloud>,
+    cameras: &[Camera],
+    up: DVec3,
+) -> Arc<Explored> {
+    let known = explored.filter(|e| Arc::ptr_eq(&e.cloud, &cloud));
+    known.unwrap_or_else(|| Arc::new(Explored::new(cloud, cameras, up)))
 }
 
 /// Outcome of a visit.

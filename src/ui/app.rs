@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use super::actions::Action;
+use super::arrival::PhotoArrival;
 use super::camera::CameraPane;
 use super::chat::Chat;
 use super::ctx::Ctx;
@@ -28,6 +29,7 @@ use super::theme;
 use super::toasts::Toasts;
 use super::viewport::Viewport;
 use crate::jobs::Folders;
+use crate::jobs::locate::kept::PhotoLocator;
 use crate::jobs::workspace::{ChangeElsewhere, Workspace};
 use crate::pipeline::observer::Observer;
 use crate::remote::ServerLink;
@@ -53,6 +55,10 @@ pub struct App {
     pub(super) tasks: Tasks,
     /// What is done with the results of running jobs.
     pending: BTreeMap<JobId, Then>,
+    /// Locates photos in the scene of this number.
+    pub(super) locator: Option<(u64, PhotoLocator)>,
+    /// The located photo that the camera flies to.
+    pub(super) arrival: Option<PhotoArrival>,
     /// The server whose scene is on screen.
     pub(super) link: Option<ServerLink>,
     pub(super) repaint: Repaint,
@@ -128,6 +134,8 @@ impl App {
             workspace: Arc::new(Workspace::new(folders)),
             tasks: Tasks::start(unhurried)?,
             pending: BTreeMap::new(),
+            locator: None,
+            arrival: None,
             link: None,
             viewport: Viewport::new(Arc::clone(&repaint))?,
             state,

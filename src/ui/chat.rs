@@ -20,7 +20,7 @@ use super::theme;
 use super::viewport::Viewport;
 use crate::agent::commands::{Commands, complete, part_not_understood};
 use crate::agent::llm::Llm;
-use crate::agent::scene::{AgentScene, Effect, SceneWorld};
+use crate::agent::scene::{AgentScene, Effect, ScenePhotos, SceneWorld};
 use crate::agent::{AgentEvent, Awaited, Planner, Policy, RefusalKind, Session, World};
 use crate::navigate::Pose;
 use crate::scene::resource_log::{self, ResourceKind};
@@ -55,6 +55,7 @@ pub(crate) struct Snapshot {
     pub(crate) hidden: Vec<IdentityId>,
     /// Description of the last change that can be undone.
     pub(crate) undoable: Option<String>,
+    pub(crate) photos: ScenePhotos,
 }
 
 struct Request {
@@ -362,7 +363,7 @@ impl Agent {
 
     /// Brings session and world up to date.
     fn get_ready(&mut self, snapshot: Snapshot, settings: ChatSettings) -> Result<(), String> {
-        let Snapshot { parts, cloud, scene, eye, aspect, hidden, undoable } = snapshot;
+        let Snapshot { parts, cloud, scene, eye, aspect, hidden, undoable, photos } = snapshot;
         let (key, map, recipe) = ((scene, cloud), Arc::clone(&parts.map), parts.recipe.clone());
         if self.world.as_ref().is_none_or(|(known, _)| *known != key) {
             let (news, repaint) = (self.news.clone(), Arc::clone(&self.repaint));
@@ -378,7 +379,7 @@ impl Agent {
         if let Some((_, world)) = &mut self.world {
             world.keep_up(eye, aspect, &hidden, &map);
             world.answer_by(&recipe).map_err(|e| e.to_string())?;
-            world.undoable = undoable;
+            (world.undoable, world.photos) = (undoable, photos);
         }
         if self.session.as_ref().is_none_or(|(known, _)| *known != settings) {
             let policy = Policy::from_environment().map_err(|e| e.to_string())?;

@@ -106,11 +106,11 @@ pub(crate) fn show_question(ctx: &egui::Context, text: &str, yes: &'static str, 
 }
 
 /// Draws a hint over the window that the dragged files can be dropped.
-pub(super) fn drop_hint(ctx: &egui::Context) {
+pub(super) fn drop_hint(ctx: &egui::Context, text: &str) {
     let painter = ctx.layer_painter(egui::LayerId::new(egui::Order::Foreground, egui::Id::unique("drop")));
     let rect = ctx.content_rect();
     painter.rect_filled(rect, 0.0, egui::Color32::from_black_alpha(170));
     painter.rect_stroke(rect.shrink(24.0), 12.0, egui::Stroke::new(2.0, theme::accent()), egui::StrokeKind::Inside);
     let font = egui::FontId::proportional(24.0);
-    painter.text(rect.center(), egui::Align2::CENTER_CENTER, "Drop to open", font, theme::text());
+    painter.text(rect.center(), egui::Align2::CENTER_CENTER, text, font, theme::text());
 }

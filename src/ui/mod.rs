@@ -7,6 +7,7 @@
 mod act;
 pub mod actions;
 pub mod app;
+mod arrival;
 pub(crate) mod camera;
 pub(crate) mod chat;
 mod chat_lines;

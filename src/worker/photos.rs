@@ -8,14 +8,15 @@ use crate::scene::{Photo, PhotoPixels};
 /// requests wait.
 pub(crate) type RemotePhotos = Box<dyn Fn(usize, &Photo, u32) -> Option<Task<PhotoPixels>> + Send>;
 
-/// Loads a photo, undistorted and at most `max_side_px` along its longer side. `index` is its place in the data set.
+/// Loads a photo, undistorted and at most `max_side_px` along its longer side. `index` is its place in the data set;
+/// without one, it is a file of this computer.
 pub(crate) fn load_photo(
     tasks: &Tasks,
-    index: usize,
+    index: Option<usize>,
     photo: &Photo,
     max_side_px: u32,
 ) -> Result<Task<PhotoPixels>, QueueFull> {
-    if let Some(remote) = tasks.remote_photos() {
+    if let Some((remote, index)) = tasks.remote_photos().zip(index) {
         return remote(index, photo, max_side_px).ok_or(QueueFull);
     }
     let photo = photo.clone();

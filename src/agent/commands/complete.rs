@@ -1,6 +1,6 @@
 //! Completion while typing, from the commands and from the names in the scene.
 
-use super::form::{FormItem, FormRequest, FormSlot, Things, sequences};
+use super::form::{FormItem, FormRequest, FormSlot, Things, is_file, sequences};
 use super::{SEPARATORS, clauses};
 use crate::agent::language::CommandLanguage;
 use crate::agent::names::NameWords;
@@ -16,8 +16,9 @@ pub fn complete(text: &str, identities: &Identities, most: usize) -> Vec<String>
     let known = NameWords::new(identities);
     // Commands before the last one must be valid; polite openers are skipped.
     let starts = |at: usize| {
-        let before = FormRequest { tokens: &tokens[..at], words: &words[..at], known: &known, things: Things::Known };
-        let opens = CommandLanguage::get().openers.contains(&words[..at].join(" "));
+        let (tokens, words) = (&tokens[..at], &words[..at]);
+        let before = FormRequest { text, tokens, words, known: &known, things: Things::Known };
+        let opens = CommandLanguage::get().openers.contains(&words.join(" "));
         at == 0 || opens || (SEPARATORS.contains(&words[at - 1]) && clauses(&before, true).is_some())
     };
     let ends_word = text.is_empty() || text.ends_with(char::is_whitespace);
@@ -83,6 +84,7 @@ impl Kept<'_> {
                     let fits = match slot {
                         _ if names => self.known.is_thing(&words[..end], true),
                         FormSlot::Name => true,
+                        FormSlot::Photo => is_file(&said),
                         FormSlot::Distance | FormSlot::Angle => words[0].starts_with(|c: char| c.is_ascii_digit()),
                         _ => options.contains(&said),
                     };
@@ -124,7 +126,7 @@ impl Kept<'_> {
             FormSlot::Distance => fixed(&["20 cm", "half a meter", "two steps", "a bit"]),
             FormSlot::Angle => fixed(&["90 degrees", "45 degrees"]),
             FormSlot::Most => LanguageWords::get().superlatives().map(str::to_owned).collect(),
-            FormSlot::Name => Vec::new(),
+            FormSlot::Name | FormSlot::Photo => Vec::new(),
         }
     }
 }

@@ -2,6 +2,7 @@
 //! matches only if it accounts for every word of the request.
 
 use std::collections::HashMap;
+use std::path::Path;
 use std::sync::OnceLock;
 
 use crate::agent::camera_args::{Direction, Distance};
@@ -9,6 +10,7 @@ use crate::agent::language::{CommandHelp, CommandLanguage, commands, find};
 use crate::agent::names::NameWords;
 use crate::agent::relation::Relation;
 use crate::agent::words::{Token, number};
+use crate::jobs::locate::is_picture;
 use crate::navigate::target::Side;
 use crate::pipeline::semantics::query::language::words::{LanguageWords, WordClass};
 use crate::scene::identity::whole_names::key;
@@ -27,6 +29,7 @@ pub(super) enum FormSlot {
     Distance,
     Angle,
     Most,
+    Photo,
 }
 
 /// Item of a form: a fixed word or a slot.
@@ -64,6 +67,8 @@ pub(crate) struct Slots {
     pub(super) distance: Option<Distance>,
     pub(super) degrees: Option<f64>,
     pub(super) most: Option<String>,
+    /// File of a photo, as typed.
+    pub(super) photo: Option<String>,
 }
 
 /// All sequences, in the order of the commands.
@@ -145,12 +150,15 @@ fn item(word: &str) -> FormItem {
         "{distance}" => FormSlot::Distance,
         "{angle}" => FormSlot::Angle,
         "{most}" => FormSlot::Most,
+        "{photo}" => FormSlot::Photo,
         word => return FormItem::Word(word.to_owned()),
     })
 }
 
 /// Request to match against the sequences.
 pub(super) struct FormRequest<'a> {
+    /// All of the text, which the tokens have their places in.
+    pub(crate) text: &'a str,
     pub(crate) tokens: &'a [Token],
     pub(crate) words: &'a [&'a str],
     pub(crate) known: &'a NameWords<'a>,
@@ -203,6 +211,13 @@ impl FormRequest<'_> {
     fn joined(&self, words: &[&str]) -> String {
         let said = quoted(words);
         self.known.whole(words).filter(|name| key(name) != key(&said)).map_or(said, str::to_owned)
+    }
+
+    /// File of a photo that the words from `at` to `end` name, as typed.
+    fn file(&self, at: usize, end: usize) -> Option<String> {
+        let (first, last) = (self.tokens.get(at)?, self.tokens.get(end - 1)?);
+        let typed = self.text.get(first.at.start..last.at.end).filter(|typed| is_file(typed))?;
+        Some(typed.trim_matches(|c: char| QUOTES.contains(c)).trim().to_owned())
     }
 
     /// Fills a slot with the words from `at` to `end`; returns whether they fit.
@@ -259,12 +274,26 @@ impl FormRequest<'_> {
                 slots.degrees = find(&language.angles, &text).or_else(|| angle(words));
                 slots.degrees.is_some()
             }
+            FormSlot::Photo => {
+                slots.photo = self.file(at, end);
+                slots.photo.is_some()
+            }
             FormSlot::Most => {
                 slots.most = Some(text);
                 vocabulary.order(words[0]).is_some_and(|o| o.superlative) && words.len() == 1
             }
         }
     }
+}
+
+/// Quotation marks around a file's name.
+const QUOTES: &str = "\"'\u{201c}\u{201d}";
+
+/// Returns whether a text is the name of one picture file; what is in quotes may have any words.
+pub(super) fn is_file(text: &str) -> bool {
+    let joins = |word: &str| matches!(word, "and" | "then") || word.ends_with(',');
+    let is_one = text.starts_with(|c: char| QUOTES.contains(c)) || !text.split_whitespace().any(joins);
+    is_one && is_picture(Path::new(text.trim_matches(|c: char| QUOTES.contains(c))))
 }
 
 fn quoted(words: &[&str]) -> String {

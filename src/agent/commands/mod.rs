@@ -131,7 +131,8 @@ impl Commands {
 pub(crate) fn parse(request: &str, identities: &Identities) -> Option<Vec<CommandStep>> {
     let (tokens, known) = (request_tokens(request), NameWords::new(identities));
     let words: Vec<&str> = tokens.iter().map(|t| t.low.as_str()).collect();
-    let with = |things| clauses(&FormRequest { tokens: &tokens, words: &words, known: &known, things }, true);
+    let with =
+        |things| clauses(&FormRequest { text: request, tokens: &tokens, words: &words, known: &known, things }, true);
     let mut readings = [Things::Whole, Things::Known, Things::Any].into_iter();
     readings.find_map(with).filter(|tasks| tasks.len() <= MOST_TASKS)
 }

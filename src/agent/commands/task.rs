@@ -51,6 +51,8 @@ pub(super) fn task(id: &str, slots: &Slots) -> Option<CommandStep> {
         "rename" => ToolCall::Rename { target: thing(0)?, name: slots.name.clone()? },
         "export" => ToolCall::Export { target: thing(0)? },
         "undo" => ToolCall::Undo {},
+        "locate_photo" => ToolCall::LocatePhoto { photo: slots.photo.clone() },
+        "changes" => ToolCall::ShowChanges {},
         "distance" => measure(Some(Reference::Eye))?,
         "apart" => measure(Some(Reference::Thing(thing(1)?)))?,
         "own_size" => ToolCall::Measure { target: Target::query("it"), to: None },

@@ -1,9 +1,13 @@
 //! Local scene as the agent's [`World`]: its changes are emitted to the window or the command line.
 
 mod moves;
+mod photos;
 
 use std::path::PathBuf;
 use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
+
+pub use self::photos::ScenePhotos;
 
 use super::camera_args::{Direction, Distance};
 use super::effect::Emit;
@@ -11,7 +15,7 @@ pub use super::effect::{Effect, UndoneRequest};
 use super::relation::Viewpoint;
 pub use super::view_shares::AgentScene;
 use super::view_shares::ViewShares;
-use super::world::{Arrival, IdentityFacts, Movement, QueryPlace, Unreachable, World, WorldError};
+use super::world::{Arrival, IdentityFacts, Movement, PhotoSight, QueryPlace, Unreachable, World, WorldError};
 use crate::jobs::query::QueryEngine;
 use crate::jobs::{export, export_splat, render};
 use crate::math::format;
@@ -40,6 +44,8 @@ pub struct SceneWorld {
     pub(crate) undoable: Option<String>,
     /// Identities to remove at the end of the request: one new scene lacks all of them.
     removing: Vec<IdentityId>,
+    /// Photos that the user asks about.
+    pub(crate) photos: ScenePhotos,
     emit: Emit,
 }
 
@@ -73,6 +79,7 @@ impl SceneWorld {
             done: UndoHistory::default(),
             has_changed: false,
             removing: Vec::new(),
+            photos: ScenePhotos::default(),
             undoable: None,
             emit,
         })
@@ -336,6 +343,14 @@ impl World for SceneWorld {
         let done = export_splat::run(&cloud, &file, None, &mut Silent).map_err(|e| failed(&e))?;
         let shift = done.shift.map(|shift| format!("; {}", export_splat::shift_line(shift)));
         Ok(format!("{}{}", file.display(), shift.unwrap_or_default()))
+    }
+
+    fn locate_photo(&mut self, photo: Option<&str>, cancel: &AtomicBool) -> Result<PhotoSight, WorldError> {
+        photos::locate(self, photo, false, cancel)
+    }
+
+    fn show_changes(&mut self, cancel: &AtomicBool) -> Result<PhotoSight, WorldError> {
+        photos::locate(self, None, true, cancel)
     }
 
     fn export_replaces(&self, id: IdentityId) -> Option<String> {

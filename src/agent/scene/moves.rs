@@ -7,7 +7,7 @@ use glam::{DMat3, DVec3};
 use super::{Before, Effect, SceneWorld};
 use crate::agent::camera_args::{Direction, Distance, NORMAL};
 use crate::agent::world::{Arrival, Movement, Unreachable};
-use crate::jobs::go_to::{self, ApproachRequest, Approached, Explored};
+use crate::jobs::go_to::{self, ApproachRequest, Approached, Explored, FlightRequest};
 use crate::navigate::approach::Approach;
 use crate::navigate::target::{Side, ViewPreference};
 use crate::navigate::{CameraTrajectory, FRAMES, Pose, Speed};
@@ -116,6 +116,23 @@ pub(super) fn straight(scene: &mut SceneWorld, to: Pose, what: String) -> Result
     let length = flight.length;
     fly(scene, flight, None, what);
     Ok(length)
+}
+
+/// Flies to a pose around what is in the way; straight, if there is no way around.
+pub(super) fn fly_pose(scene: &mut SceneWorld, to: Pose, what: String) -> Result<(), Unreachable> {
+    let request = FlightRequest {
+        explored: Some(explored(scene)),
+        cloud: Arc::clone(&scene.parts.cloud),
+        cameras: Vec::new(),
+        up: scene.parts.up,
+        from: scene.eye,
+        to,
+        frames: FRAMES,
+    };
+    let flight = go_to::fly_to_pose(request).1;
+    let flight = flight.ok_or_else(|| Unreachable { reason: "the view has no place".into(), nearest: None })?;
+    fly(scene, flight, None, what);
+    Ok(())
 }
 
 fn fly(scene: &mut SceneWorld, flight: CameraTrajectory, about: Option<DVec3>, what: String) {

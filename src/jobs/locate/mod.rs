@@ -1,7 +1,10 @@
 //! Locates photos that nobody posed in a trained scene.
 
 pub(crate) mod check;
+pub(crate) mod kept;
 mod lens;
+#[cfg(test)]
+pub(crate) mod testing;
 pub(crate) mod write;
 
 use std::path::{Path, PathBuf};
@@ -14,14 +17,30 @@ use self::lens::PhotoLens;
 use super::error::chain;
 use super::{JobError, Scene, open};
 use crate::io;
+use crate::io::photo::{is_photo, is_unread};
+use crate::math::format;
 use crate::pipeline::locate::{FocalKnowledge, FoundPlace, Locator, PHOTO_PX, USUAL_PX};
 use crate::pipeline::observer::{Observer, Severity, Ticker};
-use crate::scene::{Camera, Dataset, Distortion, Photo};
+use crate::scene::{Camera, Dataset, Distortion, Photo, text};
 
 /// Largest longer side at which colors are aligned, px: photos are loaded no larger.
 pub(crate) const MOST_PX: u32 = PHOTO_PX;
 /// Usual longer side at which colors are aligned, px.
 pub(crate) const DEFAULT_PX: u32 = USUAL_PX;
+
+/// Endings of photos, as dialogs take them.
+pub(crate) const PICTURES: [&str; 7] = [".jpg", ".jpeg", ".png", ".webp", ".tif", ".tiff", ".bmp"];
+
+/// Returns whether a file of this name is a picture, also of a known format that is not read.
+pub(crate) fn is_picture(path: &Path) -> bool {
+    path.file_name().and_then(|name| name.to_str()).is_some_and(|name| is_photo(name) || is_unread(name))
+}
+
+/// Last component of a path, as it may be shown.
+pub(crate) fn file_name(path: &Path) -> String {
+    let name = path.file_name().unwrap_or(path.as_os_str());
+    text::line(&name.to_string_lossy()).into_owned()
+}
 
 /// Choices for locating photos.
 #[derive(Clone, Debug)]
@@ -36,7 +55,7 @@ pub(crate) struct LocateOptions {
 
 /// A photo and what was found of it.
 #[derive(Clone, Debug, Serialize)]
-pub(crate) struct LocatedPhoto {
+pub struct LocatedPhoto {
     pub(crate) photo: PathBuf,
     /// True if it shows the scene, and `place` is where it was taken.
     pub(crate) located: bool,
@@ -89,6 +108,37 @@ impl PhotoPlace {
             rotation_deviation_deg: deviations.map(|d| d.1),
             covariance: found.covariance,
         }
+    }
+
+    /// "93 % explained".
+    pub(crate) fn share_text(&self) -> String {
+        format!("{:.0} % explained", 100.0 * self.explained)
+    }
+
+    /// "\u{b1} 0.8 cm and 0.05\u{b0}", standard deviations; `None` where the photo does not determine its place.
+    pub(crate) fn deviation_text(&self, meters_per_unit: Option<f64>) -> Option<String> {
+        let (center, turn_deg) = self.center_deviation.zip(self.rotation_deviation_deg)?;
+        let turn = if turn_deg < 0.005 { "0.01".to_owned() } else { format!("{turn_deg:.2}") };
+        Some(format!("\u{b1} {} and {turn}\u{b0}", format::length(center, meters_per_unit)))
+    }
+}
+
+impl LocatedPhoto {
+    /// Name of the file.
+    pub(crate) fn name(&self) -> String {
+        file_name(&self.photo)
+    }
+
+    /// The photo with its camera and lens, if it was located.
+    pub(crate) fn posed(&self) -> Option<Photo> {
+        let place = self.place.as_ref().filter(|_| self.located)?;
+        Some(Photo { distortion: place.distortion, ..Photo::new(self.name(), &*self.photo, place.camera.clone()) })
+    }
+
+    /// Sentence on why it was not located.
+    pub(crate) fn refusal_text(&self) -> String {
+        let why = self.problem.as_deref().unwrap_or_default();
+        format!("No place was found for {}: {}.", self.name(), why.trim_end_matches('.'))
     }
 }
 

@@ -60,7 +60,7 @@ pub(in crate::ui) fn save_sheet(app: &mut App, folder: PathBuf) {
     let Some((scene, phrase)) = app.state.scene.clone().zip(app.viewport.compared.phrase().map(str::to_owned)) else {
         return app.state.toast(Tone::Warning, "Type a phrase for all scenes first.");
     };
-    let photo = app.viewport.photo_index().or_else(|| view::nearest_photo(app, &BTreeSet::new()));
+    let photo = app.viewport.own_photo_index().or_else(|| view::nearest_photo(app, &BTreeSet::new()));
     let by_photo = scene.dataset.as_ref().zip(photo).map(|(data, photo)| data.photos[photo].name.clone());
     let cameras = scene.cameras.iter().map(|camera| &camera.camera);
     let by_camera = || Some(scene.cameras[view::nearest_camera(app, cameras)?].name.clone());

@@ -10,6 +10,7 @@ pub(super) mod elsewhere;
 pub(super) mod export;
 pub(super) mod gaussians;
 pub(super) mod import;
+pub(super) mod locate;
 pub(super) mod measure;
 pub(super) mod objects;
 pub(super) mod open;

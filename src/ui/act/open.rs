@@ -4,12 +4,13 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use crate::jobs::demo::QUESTION;
+use crate::jobs::locate::is_picture;
 use crate::jobs::poses::front_door::PoseRequest;
 use crate::jobs::workspace::OpenedPath;
 use crate::jobs::{JobError, OpenedScene, phases, presets};
 use crate::measure::{Report, is_report};
 use crate::pipeline::observer::Observer;
-use crate::ui::act::remote;
+use crate::ui::act::{locate, remote};
 use crate::ui::actions::{Action, Pane};
 use crate::ui::app::App;
 use crate::ui::camera;
@@ -35,13 +36,16 @@ pub(in crate::ui) fn choose_file(app: &mut App) {
     app.choose(request, |app, path| app.ask(Action::Open(path)));
 }
 
-/// Opens a report, a file of training settings, or another scene.
+/// Opens a report, a file of training settings, or another scene; in an open scene, a photo is located.
 pub(in crate::ui) fn open(app: &mut App, path: PathBuf) {
     if is_report(&path) {
         return report(app, path, false);
     }
     if path.extension().is_some_and(|e| e == "toml") {
         return preset(app, &path);
+    }
+    if app.state.scene.is_some() && is_picture(&path) {
+        return locate::start(app, vec![path]);
     }
     // A scene beside this one, or made from it, is of the same place.
     let is_beside = app.state.beside.iter().any(|other| other.path == path);

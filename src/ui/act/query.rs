@@ -5,8 +5,8 @@ use std::sync::Arc;
 
 use egui::{Key, Modifiers};
 
-use super::{edits, objects};
-use crate::agent::scene::{AgentScene, Effect};
+use super::{edits, locate, objects};
+use crate::agent::scene::{AgentScene, Effect, ScenePhotos};
 use crate::jobs::edit::EditRequest;
 use crate::jobs::export;
 use crate::jobs::phrases::{self, PhrasesRequest, TrueMasks};
@@ -196,6 +196,7 @@ pub(in crate::ui) fn send_chat(app: &mut App) {
         aspect,
         hidden: app.viewport.visibility.hidden().iter().copied().collect(),
         undoable: app.state.changes.last().map(str::to_owned),
+        photos: ScenePhotos { locator: locate::locator(app).ok(), given: app.state.located.given.clone() },
     };
     app.chat.send(text, snapshot, app.layout.chat.clone(), &app.repaint);
 }
@@ -223,6 +224,7 @@ pub(in crate::ui) fn effect(app: &mut App, effect: Effect) {
             edits::queue(app, EditStep::Said(EditRequest::Apply(Edit::Rename(id, name)), sentence));
         }
         Effect::Undone(undone) => edits::queue(app, EditStep::UndoSentence(undone)),
+        Effect::Located(found, differs) => locate::show(app, *found, differs),
         Effect::Explored(explored) => app.state.explored = Some(explored),
     }
 }

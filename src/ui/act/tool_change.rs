@@ -1,6 +1,7 @@
 //! Actions that would end a tool with unfinished work: the user is asked first.
 
 use super::edit;
+use crate::jobs::locate::is_picture;
 use crate::measure::is_report;
 use crate::ui::actions::Action;
 use crate::ui::app::App;
@@ -41,8 +42,10 @@ fn ends_tool(action: &Action, app: &App) -> bool {
         | Action::FindPoses(_)
         | Action::Connect(_) => true,
         Action::SelectBy(_) => !app.viewport.is_selecting(),
-        // Reports and settings are no scenes.
-        Action::Open(path) => !is_report(path) && path.extension().is_none_or(|ending| ending != "toml"),
+        // Reports, settings and photos are no scenes.
+        Action::Open(path) => {
+            !is_report(path) && !is_picture(path) && path.extension().is_none_or(|ending| ending != "toml")
+        }
         _ => false,
     }
 }

@@ -227,6 +227,18 @@ macro_rules! action_table {
                 => view::tint(app, ctx, by);
             ToggleCompare: "Compare with the photo", "Show the photo beside the rendering with a slider between them.", "C"
                 => view::toggle_compare(app, ctx);
+            ChoosePhoto: "Locate a photo\u{2026}",
+                "Find where a photo was taken that nobody posed, go there and compare it with the scene. Dropping it on the view does the same."
+                => locate::choose(app);
+            LocatePhotos(paths: Vec<PathBuf>): match paths.as_slice() {
+                    [one] => format!("Locate {}", one.display()),
+                    all => format!("Locate {} photos", all.len()),
+                },
+                "Find where they were taken, go there and compare them with the scene." => locate::start(app, paths);
+            SavePose: "Save its pose\u{2026}",
+                "Write the camera of the located photo as a transforms.json beside it." => locate::save_pose(app);
+            ForgetPhoto: "Remove the located photo",
+                "Take it off the list; its file stays." => locate::forget(app);
             ToggleSplit: "Split view", "Two views of the scene by one camera, each with its own query and colors.", "8"
                 => view::toggle_split(app);
             OtherView: "Switch view", "Keys, queries and colors act on it from now on.", "0"

@@ -2,6 +2,7 @@
 
 use egui::{CentralPanel, Frame, Margin, Panel, ScrollArea, Ui};
 
+use crate::jobs::locate::is_picture;
 use crate::ui::act::{export, gaussians, objects, view};
 use crate::ui::actions::{Action, Pane};
 use crate::ui::app::App;
@@ -43,8 +44,9 @@ pub(super) fn panes(app: &mut App, ui: &mut Ui) {
 
 /// Dialogs and messages over everything.
 pub(super) fn over_everything(app: &mut App, ctx: &egui::Context) {
-    if ctx.input(|i| !i.raw.hovered_files.is_empty()) {
-        dialogs::drop_hint(ctx);
+    if let Some(first) = ctx.input(|i| i.raw.hovered_files.first().cloned()) {
+        let is_photo = app.state.scene.is_some() && first.path.is_some_and(|path| is_picture(&path));
+        dialogs::drop_hint(ctx, if is_photo { "Drop to find where it was taken" } else { "Drop to open" });
     }
     let selection = app.state.semantics.as_ref().zip(view::chosen_identity(app));
     let selection = selection.map(|(map, id)| {

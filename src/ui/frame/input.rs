@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use egui::{Context, Key, Modifiers};
 
+use crate::jobs::locate::is_picture;
 use crate::measure::is_report;
 use crate::ui::act::{act, edits, query};
 use crate::ui::actions::Action;
@@ -50,11 +51,14 @@ pub(super) fn take(app: &mut App, ctx: &Context) {
             }
         }
     }
-    let dropped: Vec<PathBuf> =
-        ctx.input(|i| i.raw.dropped_files.iter().map(|f| f.path().to_path_buf()).take(2).collect());
+    let dropped: Vec<PathBuf> = ctx.input(|i| i.raw.dropped_files.iter().map(|f| f.path().to_path_buf()).collect());
     match dropped.as_slice() {
-        [one, other] if is_report(one) && is_report(other) => {
+        [one, other, ..] if is_report(one) && is_report(other) => {
             app.actions.extend([Action::OpenReport(one.clone()), Action::CompareReport(other.clone())]);
+        }
+        [first, _, ..] if app.state.scene.is_some() && is_picture(first) => {
+            let photos = dropped.iter().filter(|path| is_picture(path)).cloned().collect();
+            app.actions.push(Action::LocatePhotos(photos));
         }
         all => app.actions.extend(all.first().cloned().map(Action::Open)),
     }

@@ -5,7 +5,7 @@ mod input;
 
 use egui::Ui;
 
-use super::act::{act, camera_path, edits, elsewhere, measure, query, remote, view, window};
+use super::act::{act, camera_path, edits, elsewhere, locate, measure, query, remote, view, window};
 use super::actions::Pane;
 use super::app::App;
 use super::state::Tone;
@@ -81,6 +81,7 @@ fn take_news(app: &mut App, ctx: &egui::Context) {
     edits::next(app);
     query::send_chat(app);
     view::play(app, ctx);
+    locate::keep_up(app, ctx);
     let App { state, viewport, tasks, workspace, .. } = app;
     if app.first_page.update(ctx, state, viewport, tasks, workspace) {
         app.photos.runs.refresh();

@@ -36,6 +36,7 @@ pub(crate) fn top(ui: &mut Ui, cx: &mut Ctx<'_>, view: &Viewport) {
     ui.horizontal(|ui| {
         let has_scene = state.scene.is_some();
         let has_photos = state.scene.as_ref().is_some_and(|s| s.dataset.is_some());
+        let has_any_photos = has_photos || !state.located.is_empty();
         ui.menu_button("File", |ui| {
             ui.set_min_width(260.0);
             for action in
@@ -97,10 +98,11 @@ pub(crate) fn top(ui: &mut Ui, cx: &mut Ctx<'_>, view: &Viewport) {
                 }
             });
             ui.separator();
-            item(ui, has_photos, Some(cx.layout.cameras), Action::ToggleCameras, cx);
+            item(ui, has_any_photos, Some(cx.layout.cameras), Action::ToggleCameras, cx);
             let has_measured = !view.measurements.is_empty();
             item(ui, has_measured, Some(cx.layout.measurements), Action::ToggleMeasurements, cx);
-            item(ui, has_photos, Some(cx.layout.compare), Action::ToggleCompare, cx);
+            item(ui, has_any_photos, Some(cx.layout.compare), Action::ToggleCompare, cx);
+            item(ui, has_scene, Some(false), Action::ChoosePhoto, cx);
             item(ui, has_scene, Some(cx.layout.split_view), Action::ToggleSplit, cx);
             item(ui, cx.layout.split_view, Some(false), Action::OtherView, cx);
             item(ui, has_scene, Some(false), Action::ChooseComparison, cx);
@@ -123,7 +125,7 @@ pub(crate) fn top(ui: &mut Ui, cx: &mut Ctx<'_>, view: &Viewport) {
                 }
             });
             for action in [Action::PreviousPhoto, Action::NextPhoto] {
-                item(ui, has_photos, Some(false), action, cx);
+                item(ui, has_any_photos, Some(false), action, cx);
             }
             ui.separator();
             item(ui, has_scene, Some(false), Action::FillWindow, cx);

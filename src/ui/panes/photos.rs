@@ -30,6 +30,8 @@ const CAPTION: f32 = 18.0;
 #[derive(Default)]
 pub(crate) struct PhotosPane {
     scene: u64,
+    /// State of the located photos that the last thumbnails are of.
+    located: u64,
     loaded: BTreeMap<usize, TextureHandle>,
     loading: HashMap<usize, Task<PhotoPixels>>,
     failed: BTreeSet<usize>,
@@ -42,6 +44,12 @@ impl PhotosPane {
     pub(crate) fn update(&mut self, ctx: &egui::Context, state: &AppState) {
         if self.scene != state.scene_number {
             *self = Self { scene: state.scene_number, runs: std::mem::take(&mut self.runs), ..Self::default() };
+        }
+        if std::mem::replace(&mut self.located, state.located.revision) != state.located.revision {
+            let own = state.own_photos();
+            self.loaded.retain(|index, _| *index < own);
+            self.failed.retain(|index| *index < own);
+            self.loading.retain(|index, _| *index < own);
         }
         let (loaded, failed) = (&mut self.loaded, &mut self.failed);
         self.loading.retain(|&index, task| {
@@ -58,15 +66,16 @@ impl PhotosPane {
         });
     }
 
-    fn request(&mut self, index: usize, dataset: &Dataset, tasks: &Tasks) {
-        let Some(photo) = dataset.photos.get(index).filter(|photo| photo.has_pixels()) else { return };
+    fn request(&mut self, index: usize, state: &AppState, tasks: &Tasks) {
+        let Some(photo) = state.photo(index).filter(|photo| photo.has_pixels()) else { return };
         let is_known =
             self.loaded.contains_key(&index) || self.failed.contains(&index) || self.loading.contains_key(&index);
         if is_known || self.loading.len() >= AT_ONCE {
             return;
         }
         // With a full queue the request is repeated at the next redraw.
-        if let Ok(task) = load_photo(tasks, index, photo, SIDE_PX) {
+        let own = state.placed(index).is_none().then_some(index);
+        if let Ok(task) = load_photo(tasks, own, photo, SIDE_PX) {
             self.loading.insert(index, task);
         }
     }
@@ -87,7 +96,11 @@ impl PhotosPane {
 
     fn cell(&self, ui: &mut Ui, size: egui::Vec2, index: usize, caption: &Caption<'_>, selected: bool) -> bool {
         let (rect, response) = ui.allocate_exact_size(size, Sense::click());
-        let held = if caption.held { ", held-out" } else { "" };
+        let held = match caption.kind {
+            PhotoKind::Train => "",
+            PhotoKind::HeldOut => ", held-out",
+            PhotoKind::Located => ", located",
+        };
         response.widget_info(|| {
             egui::WidgetInfo::selected(egui::Role::Button, true, selected, format!("Photo {}{held}", caption.name))
         });
@@ -114,14 +127,17 @@ impl PhotosPane {
         ui.painter().rect_stroke(picture, 5.0, border, egui::StrokeKind::Inside);
         let y = rect.bottom() - 0.5 * CAPTION;
         let file = caption.name.rsplit('/').next().unwrap_or(caption.name);
-        let color = if caption.held { theme::warning() } else { theme::weak() };
+        let (color, what) = match caption.kind {
+            PhotoKind::Train => (theme::weak(), "used for training"),
+            PhotoKind::HeldOut => (theme::warning(), "held out for evaluation"),
+            PhotoKind::Located => (theme::good(), "located in the scene, as long as it is open"),
+        };
         let room = if caption.psnr.is_some() { 9 } else { 16 };
         text(ui, pos2(rect.left() + 2.0, y), egui::Align2::LEFT_CENTER, &text::elided_file(file, room), color);
         if let Some(psnr) = caption.psnr {
             text(ui, pos2(rect.right() - 2.0, y), egui::Align2::RIGHT_CENTER, &format!("{psnr:.1} dB"), theme::text());
         }
-        let use_ = if caption.held { "held out for evaluation" } else { "used for training" };
-        response.on_hover_text(format!("{}\n{use_}\nClick to look through its camera", caption.name)).clicked()
+        response.on_hover_text(format!("{}\n{what}\nClick to look through its camera", caption.name)).clicked()
     }
 }
 
@@ -149,17 +165,23 @@ impl PaneContents for PhotosPane {
         let gap = 6.0;
         let width = (ui.available_width() - gap * (columns - 1) as f32 - 4.0) / columns as f32;
         let cell = vec2(width, width * 0.75 + CAPTION);
-        let rows = dataset.photos.len().div_ceil(columns);
+        let count = state.photo_count();
+        let rows = count.div_ceil(columns);
         ui.spacing_mut().item_spacing.y = gap;
         ScrollArea::vertical().auto_shrink([false, false]).show_rows(ui, cell.y, rows, |ui, visible| {
             for row in visible.clone() {
                 ui.horizontal(|ui| {
                     ui.spacing_mut().item_spacing.x = gap;
-                    for index in (row * columns..(row + 1) * columns).take_while(|i| *i < dataset.photos.len()) {
-                        self.request(index, dataset, cx.tasks);
-                        let photo = &dataset.photos[index];
-                        let (name, held) = (&*photo.title(), test.contains(&index));
-                        let caption = Caption { name, held, psnr: scores.get(photo.name.as_str()).copied() };
+                    for index in (row * columns..(row + 1) * columns).take_while(|i| *i < count) {
+                        let Some(photo) = state.photo(index) else { continue };
+                        self.request(index, state, cx.tasks);
+                        let kind = match state.placed(index) {
+                            Some(_) => PhotoKind::Located,
+                            None if test.contains(&index) => PhotoKind::HeldOut,
+                            None => PhotoKind::Train,
+                        };
+                        let psnr = scores.get(photo.name.as_str()).copied().filter(|_| kind != PhotoKind::Located);
+                        let caption = Caption { name: &photo.title(), kind, psnr };
                         if self.cell(ui, cell, index, &caption, current == Some(index)) {
                             cx.ask(Action::GoToPhoto(index));
                         }
@@ -171,9 +193,17 @@ impl PaneContents for PhotosPane {
     }
 }
 
+/// Use of a photo.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum PhotoKind {
+    Train,
+    HeldOut,
+    Located,
+}
+
 struct Caption<'a> {
     name: &'a str,
-    held: bool,
+    kind: PhotoKind,
     psnr: Option<f64>,
 }
 

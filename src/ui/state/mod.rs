@@ -4,6 +4,7 @@ use std::collections::{BTreeMap, VecDeque};
 use std::path::PathBuf;
 use std::sync::Arc;
 
+pub use self::located::{LocatedPhotos, PlacedPhoto};
 pub use self::messages::{ErrorBox, LogLine};
 pub(crate) use self::messages::{Toast, Tone};
 pub use self::running::RunningJob;
@@ -28,6 +29,7 @@ use crate::scene::findings::IdentityEvidence;
 use crate::scene::{GaussianCloud, IdentityId, Limits, Overrides, SceneFacts, ScenePlan, SemanticMap, text};
 use crate::worker::{Event, JobEnd, JobId, JobInfo, JobLane, Makes, Versioned};
 
+mod located;
 mod messages;
 mod running;
 mod training;
@@ -67,6 +69,8 @@ pub struct AppState {
     pub(crate) sizes: Vec<usize>,
     pub(crate) labels: ScreenNames,
     pub phrases: PhraseTable,
+    /// Photos that were located in the scene.
+    pub located: LocatedPhotos,
     /// Free space of the scene, if explored.
     pub explored: Option<Arc<Explored>>,
     /// Models and the engine that runs them, once listed.
@@ -271,6 +275,7 @@ impl AppState {
         self.scene_number += 1;
         (self.explored, self.removed) = (None, None);
         self.beside.clear();
+        self.located = LocatedPhotos::default();
         self.set_facts(scene.facts.clone());
         self.antialias = scene.settings.antialias;
         self.set_semantics(scene.semantics.clone());

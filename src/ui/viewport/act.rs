@@ -89,7 +89,7 @@ impl Viewport {
     /// Looks through the photo `by` places after the current one, around the end of the list; from a free view,
     /// through the first or the last.
     pub(crate) fn step_photo(&mut self, by: isize, state: &AppState, tasks: &Tasks, now: f64) {
-        let photos = state.scene.as_ref().and_then(|s| s.dataset.as_ref()).map_or(0, |d| d.photos.len());
+        let photos = state.photo_count();
         if photos == 0 {
             return;
         }
@@ -101,9 +101,9 @@ impl Viewport {
     /// Looks through the camera of a photo.
     pub(crate) fn look_through(&mut self, index: usize, state: &AppState, tasks: &Tasks, now: f64) {
         let Some(scene) = &state.scene else { return };
-        let Some(photo) = scene.dataset.as_ref().and_then(|d| d.photos.get(index)) else { return };
+        let Some(photo) = state.photo(index) else { return };
         self.eye = Eye::of_photo(&photo.camera, &scene.home, self.up(scene));
-        self.photo = Some(PhotoView::new(index, photo, tasks));
+        self.photo = Some(PhotoView::new(index, photo, state.placed(index).is_some(), tasks));
         self.moved_at = now;
     }
 
@@ -165,7 +165,7 @@ impl Viewport {
     }
 
     /// Leaves the photo's camera at its pose, with the scale of the frame.
-    pub(super) fn leave_photo(&mut self) {
+    pub(crate) fn leave_photo(&mut self) {
         if let Some(photo) = self.photo.take() {
             self.eye.fov_y_rad = photo.free_fov(self.eye.fov_y_rad);
         }

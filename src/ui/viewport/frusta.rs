@@ -3,7 +3,7 @@
 use egui::{Color32, Painter, Pos2, Rect, Response, Stroke, Ui};
 use glam::{DVec2, DVec3};
 
-use crate::scene::Camera;
+use crate::scene::{Camera, Photo};
 use crate::ui::actions::Action;
 use crate::ui::ctx::Ctx;
 use crate::ui::theme;
@@ -18,7 +18,6 @@ const MOST: usize = 10;
 pub(super) fn show(ui: &Ui, rect: Rect, eye: &Camera, response: &Response, cx: &mut Ctx<'_>) -> bool {
     let state = cx.state;
     let Some(scene) = &state.scene else { return false };
-    let Some(dataset) = &scene.dataset else { return false };
     let painter = ui.painter_at(rect);
     let size = 0.09 * scene.home.bounds.radius();
     let held_out: std::collections::HashSet<usize> =
@@ -26,23 +25,23 @@ pub(super) fn show(ui: &Ui, rect: Rect, eye: &Camera, response: &Response, cx: &
     let cursor = response.hover_pos().filter(|pos| rect.contains(*pos));
     let place = |p: DVec2| rect.min + egui::vec2(p.x as f32, p.y as f32);
     // From inside, a camera is only lines along the border of the view.
-    let distance = |i: usize| dataset.photos[i].camera.center.distance(eye.center);
-    let mut drawn: Vec<usize> = (0..dataset.photos.len()).filter(|i| distance(*i) >= size).collect();
-    drawn.sort_by(|a, b| distance(*a).total_cmp(&distance(*b)));
-    drawn.retain(|i| eye.project(dataset.photos[*i].camera.center).is_some());
+    let mut drawn: Vec<(f64, usize, &Photo)> = (0..state.photo_count())
+        .filter_map(|i| state.photo(i).map(|photo| (photo.camera.center.distance(eye.center), i, photo)))
+        .filter(|(distance, _, photo)| *distance >= size && eye.project(photo.camera.center).is_some())
+        .collect();
+    drawn.sort_by(|a, b| a.0.total_cmp(&b.0));
     drawn.truncate(MOST);
     let nearest = cursor.and_then(|cursor| {
-        let apexes = drawn.iter().map(|i| (*i, &dataset.photos[*i]));
-        let seen = apexes.filter_map(|(i, p)| Some((i, place(eye.project(p.camera.center)?))));
-        let (i, at) = seen.min_by(|a, b| a.1.distance(cursor).total_cmp(&b.1.distance(cursor)))?;
-        (at.distance(cursor) < REACH).then_some((i, at))
+        let seen = drawn.iter().filter_map(|(_, i, p)| Some((*i, *p, place(eye.project(p.camera.center)?))));
+        let (i, photo, at) = seen.min_by(|a, b| a.2.distance(cursor).total_cmp(&b.2.distance(cursor)))?;
+        (at.distance(cursor) < REACH).then_some((i, photo, at))
     });
-    for &i in &drawn {
-        let photo = &dataset.photos[i];
-        let near = (1.5 * scene.home.bounds.radius() / distance(i)).clamp(0.25, 1.0) as f32;
+    for &(distance, i, photo) in &drawn {
+        let near = (1.5 * scene.home.bounds.radius() / distance).clamp(0.25, 1.0) as f32;
         let pointed = nearest.is_some_and(|n| n.0 == i);
         let color = match (pointed, held_out.contains(&i)) {
             (true, _) => theme::accent(),
+            _ if state.placed(i).is_some() => theme::good().gamma_multiply(near),
             (false, true) => theme::warning().gamma_multiply(0.75 * near),
             (false, false) => Color32::from_white_alpha(130).gamma_multiply(near),
         };
@@ -53,8 +52,8 @@ pub(super) fn show(ui: &Ui, rect: Rect, eye: &Camera, response: &Response, cx: &
             draw(&painter, eye, &photo.camera, size, place, stroke);
         }
     }
-    if let Some((i, at)) = nearest {
-        label(&painter, at, &format!("{}  (click to look through)", dataset.photos[i].title()));
+    if let Some((i, photo, at)) = nearest {
+        label(&painter, at, &format!("{}  (click to look through)", photo.title()));
         if response.clicked() {
             cx.ask(Action::GoToPhoto(i));
         }

@@ -16,6 +16,7 @@ mod outline;
 mod overlay;
 pub(crate) mod overrides;
 mod photo;
+mod photo_bar;
 pub mod picking;
 pub(crate) mod query;
 mod request;
@@ -142,6 +143,11 @@ impl Viewport {
     /// Shows other Gaussians of the scene.
     pub(crate) fn set_cloud(&mut self, cloud: Option<Arc<GaussianCloud>>) {
         self.cloud = cloud.map(Versioned::new);
+    }
+
+    /// Index of the photo of the scene's own whose camera the view looks through.
+    pub(crate) fn own_photo_index(&self) -> Option<usize> {
+        self.photo.as_ref().filter(|photo| !photo.is_located()).map(PhotoView::index)
     }
 
     /// Index of the photo whose camera the view looks through.

@@ -8,6 +8,7 @@ use super::display::Display;
 use super::legend;
 use super::overrides::RenderOverrides;
 use super::photo::PhotoView;
+use super::photo_bar::{self, psnr_text};
 use super::query::Queries;
 use super::split::ViewArea;
 use super::visible::Visibility;
@@ -79,7 +80,7 @@ impl ViewCards<'_> {
             return self.beside(ui, area, figures, cx);
         }
         let dataset = state.scene.as_ref().and_then(|scene| scene.dataset.as_ref());
-        let photos = dataset.map_or(0, |d| d.photos.len());
+        let photos = state.photo_count();
         let (modes, legend) = if second { ("second modes", "second legend") } else { ("modes", "legend") };
         let menus = cx.layout.split_view || rect.width() < NARROW;
         let menus = menus.then_some(if rect.width() < NARROWEST { [52.0, 62.0] } else { [76.0, 86.0] });
@@ -92,7 +93,8 @@ impl ViewCards<'_> {
         if legend::is_needed(self.queries.settings(), depth) && rect.height() > LOW && !is_other {
             let shares = self.queries.maps().map(|m| [m.unknown_share(), m.invented_share()]);
             let can_segment = dataset.is_some() && state.is_trained();
-            let segment = if self.photo.is_some() { "Add from this photo" } else { "Add from the nearest photo" };
+            let is_own = self.photo.is_some_and(|photo| !photo.is_located());
+            let segment = if is_own { "Add from this photo" } else { "Add from the nearest photo" };
             // Above the facts if there is no room beside them.
             let up = if rect.width() < NARROW_BESIDE_FACTS { -46.0 } else { 0.0 };
             card(ui, rect, legend, Align2::RIGHT_BOTTOM, up, |ui| {
@@ -119,7 +121,8 @@ impl ViewCards<'_> {
             // Beside the modes if there is room and no query box, else below them.
             let has_room = rect.width() > 860.0 && state.semantics.is_none();
             let (align, down) = if has_room { (Align2::RIGHT_TOP, 0.0) } else { (Align2::LEFT_TOP, 46.0) };
-            card(ui, rect, "photo", align, down, |ui| self.photo_bar(ui, photos, cx));
+            let psnr = self.display.picture().and_then(|p| p.psnr);
+            card(ui, rect, "photo", align, down, |ui| photo_bar::show(ui, self.photo, psnr, cx));
         }
         let now = ui.input(|i| i.time);
         let rate = self.display.rate(now).filter(|_| self.moves).map(rate_text);
@@ -267,42 +270,6 @@ impl ViewCards<'_> {
         }
     }
 
-    fn photo_bar(&self, ui: &mut Ui, total: usize, cx: &mut Ctx<'_>) {
-        let step = |ui: &mut Ui, symbol: &str, action: Action, cx: &mut Ctx<'_>| {
-            let tip = format!("{}  {}", action.text(), keys::label(ui.ctx(), &action));
-            let button = ui.button(symbol).on_hover_text(tip).accessible_name(action.text());
-            if button.clicked() {
-                cx.ask(action);
-            }
-        };
-        step(ui, "‹", Action::PreviousPhoto, cx);
-        match self.photo {
-            Some(p) => {
-                ui.label(RichText::new(text::elided(&p.name(), 28)).strong()).on_hover_text(&*p.name());
-                ui.weak(format!("{} of {total}", p.index() + 1));
-                if let Some(psnr) = self.display.picture().and_then(|p| p.psnr) {
-                    ui.label(RichText::new(psnr_text(psnr)).color(theme::accent()))
-                        .on_hover_text("At the size of the view. Evaluation uses the size of training.");
-                }
-                if p.failed() {
-                    ui.colored_label(theme::warning(), "photo not loaded");
-                }
-            }
-            None => {
-                ui.weak("Free view");
-            }
-        }
-        step(ui, "›", Action::NextPhoto, cx);
-        // Half a view is too narrow for the slider's button, and shows the photo otherwise.
-        if self.photo.is_some() && (!cx.layout.split_view || cx.layout.compare) {
-            ui.separator();
-            let tip = format!("{}  {}", Action::ToggleCompare.tooltip(), keys::label(ui.ctx(), &Action::ToggleCompare));
-            if ui.selectable_label(cx.layout.compare, "Compare").on_hover_text(tip).clicked() {
-                cx.ask(Action::ToggleCompare);
-            }
-        }
-    }
-
     /// One line of facts about the frame.
     fn facts(&self, view_px: Vec2, rate: Option<String>, cx: &Ctx<'_>) -> Option<String> {
         let (p, state, layout) = (self.display.picture()?, cx.state, &*cx.layout);
@@ -387,9 +354,4 @@ fn other_fills(ui: &mut Ui, last: &RemoveRequest, is_wide: bool, cx: &mut Ctx<'_
 
 fn rate_text(fps: f64) -> String {
     if fps < 10.0 { format!("{fps:.1} fps") } else { format!("{fps:.0} fps") }
-}
-
-/// PSNR of a picture at the size of the view.
-fn psnr_text(psnr: f64) -> String {
-    format!("PSNR {psnr:.1} dB (view size)")
 }

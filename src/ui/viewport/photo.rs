@@ -22,6 +22,8 @@ const SIDE_PX: u32 = 1600;
 /// A photo whose camera the view looks through.
 pub(super) struct PhotoView {
     index: usize,
+    /// True if it is none of the scene's own.
+    is_located: bool,
     photo: Photo,
     /// The job that loads the photo.
     task: Option<Task<PhotoPixels>>,
@@ -35,15 +37,22 @@ pub(super) struct PhotoView {
 }
 
 impl PhotoView {
-    pub(super) fn new(index: usize, photo: &Photo, tasks: &Tasks) -> Self {
+    /// Looks through the photo with this index; `is_located` tells that it is none of the scene's own.
+    pub(super) fn new(index: usize, photo: &Photo, is_located: bool, tasks: &Tasks) -> Self {
         // With a full queue there is no photo to compare with until the next visit.
-        let task = if photo.has_pixels() { load_photo(tasks, index, photo, SIDE_PX).ok() } else { None };
+        let own = (!is_located).then_some(index);
+        let task = if photo.has_pixels() { load_photo(tasks, own, photo, SIDE_PX).ok() } else { None };
         let failed = task.is_none();
-        Self { index, photo: photo.clone(), task, pixels: None, texture: None, failed, margin: 1.0, came_from: None }
+        let photo = photo.clone();
+        Self { index, is_located, photo, task, pixels: None, texture: None, failed, margin: 1.0, came_from: None }
     }
 
     pub(super) fn index(&self) -> usize {
         self.index
+    }
+
+    pub(super) fn is_located(&self) -> bool {
+        self.is_located
     }
 
     pub(super) fn name(&self) -> Cow<'_, str> {
@@ -113,13 +122,20 @@ impl PhotoView {
             .widget_info(|| egui::WidgetInfo::labeled(egui::Role::Label, true, text));
     }
 
-    /// Draws the photo right of the split, and the handle of the split; `left` names what is on the left.
-    pub(super) fn show_split(&mut self, ui: &mut Ui, shown: Rect, left: &str, split: &mut f32) {
+    /// Draws the photo right of the split.
+    pub(super) fn paint_right(&mut self, ui: &Ui, shown: Rect, split: f32) {
         let Some(texture) = self.texture(ui) else { return };
-        let x = shown.left() + shown.width() * *split;
-        let right = Rect::from_min_max(pos2(x, shown.top()), shown.max);
-        let uv = Rect::from_min_max(pos2(*split, 0.0), pos2(1.0, 1.0));
+        let right = Rect::from_min_max(pos2(shown.left() + shown.width() * split, shown.top()), shown.max);
+        let uv = Rect::from_min_max(pos2(split, 0.0), pos2(1.0, 1.0));
         ui.painter().image(texture, right, uv, Color32::WHITE);
+    }
+
+    /// Draws the handle of the split, once the photo is loaded; `left` names what is on the left.
+    pub(super) fn show_split(&self, ui: &mut Ui, shown: Rect, left: &str, split: &mut f32) {
+        if self.texture.is_none() {
+            return;
+        }
+        let x = shown.left() + shown.width() * *split;
         let grip = Rect::from_center_size(pos2(x, shown.center().y), vec2(16.0, shown.height()));
         let response =
             ui.interact(grip, ui.scope_id().with("split"), Sense::drag()).on_hover_cursor(CursorIcon::ResizeHorizontal);

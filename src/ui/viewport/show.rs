@@ -19,6 +19,7 @@ use super::{Viewport, frusta, query, route};
 use crate::pipeline::semantics::query::language::QueryPlace;
 use crate::pipeline::semantics::query::language::viewpoint::Viewpoint;
 use crate::scene::measurement::Measurement;
+use crate::ui::color_by::ColorBy;
 use crate::ui::ctx::Ctx;
 use crate::ui::select_shape::SelectShape;
 use crate::ui::theme;
@@ -168,6 +169,12 @@ impl Viewport {
         for area in areas {
             self.queries.work_in(area.second);
             self.display.paint(ui, *area);
+            let compares = cx.layout.compare && !area.second;
+            // Masks lie over the photo, too, whose camera they are seen by; a tint would cover it.
+            let masked = self.queries.settings().color_by == ColorBy::Masks;
+            if let Some(photo) = self.photo.as_mut().filter(|_| compares && masked) {
+                photo.paint_right(ui, area.shown, cx.layout.split);
+            }
             // Answers belong to the scene, not to another one beside it.
             if let Some(semantics) =
                 state.semantics.as_ref().filter(|_| !area.is_other && !selects && !self.compared.is_on())
@@ -178,7 +185,10 @@ impl Viewport {
             let has_result = state.is_trained() || state.is_training();
             if let Some(photo) = self.photo.as_mut().filter(|_| !area.second) {
                 match cx.layout.mode {
-                    mode if cx.layout.compare => {
+                    mode if compares => {
+                        if !masked {
+                            photo.paint_right(ui, area.shown, cx.layout.split);
+                        }
                         let of = match mode {
                             ViewMode::Rgb if has_result => "Rendering",
                             ViewMode::Rgb => "Sparse points",

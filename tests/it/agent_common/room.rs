@@ -1,8 +1,10 @@
 //! A room with some forty things and parts, on boxes only, that remembers what was done to it.
 
+use std::sync::atomic::AtomicBool;
+
 use fmlgs::agent::camera_args::{Direction, Distance};
 use fmlgs::agent::relation::Viewpoint;
-use fmlgs::agent::world::{Arrival, IdentityFacts, Movement, QueryPlace, Unreachable, World, WorldError};
+use fmlgs::agent::world::{Arrival, IdentityFacts, Movement, PhotoSight, QueryPlace, Unreachable, World, WorldError};
 use fmlgs::agent::world::{locate_by_names, locate_with};
 use fmlgs::navigate::target::Side;
 use fmlgs::pipeline::semantics::query::answer::QueryAnswer;
@@ -305,6 +307,20 @@ impl World for Room {
         self.log.push(format!("{over} {}", self.name(id)));
         self.exported[id as usize] = true;
         Ok(format!("{}.ply", self.name(id)))
+    }
+
+    fn locate_photo(&mut self, photo: Option<&str>, _: &AtomicBool) -> Result<PhotoSight, WorldError> {
+        let name = photo.unwrap_or("photo.jpg").to_owned();
+        if name.contains("gone") {
+            return Err(WorldError(format!("there is no file '{name}'")));
+        }
+        self.log.push(format!("locate_photo {name}"));
+        self.eye = DVec3::new(0.5, -2.0, 1.4);
+        Ok(PhotoSight { name, center: self.eye, deviation: Some("\u{b1} 1 cm and 0.1\u{b0}".into()), explained: 0.9 })
+    }
+
+    fn show_changes(&mut self, cancel: &AtomicBool) -> Result<PhotoSight, WorldError> {
+        self.locate_photo(None, cancel)
     }
 
     fn export_replaces(&self, id: IdentityId) -> Option<String> {

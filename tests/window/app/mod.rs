@@ -11,6 +11,7 @@ mod files;
 mod hands;
 mod kept;
 mod keyboard;
+mod locating;
 mod measuring;
 mod objects;
 mod panes;

@@ -145,7 +145,7 @@ pub(in crate::ui) fn segment_photo(app: &mut App) {
     };
     let held: BTreeSet<usize> =
         scene.as_ref().map(|s| s.held_out(app.layout.config.holdout_every)).into_iter().flatten().collect();
-    let Some(photo) = app.viewport.photo_index().or_else(|| view::nearest_photo(app, &held)) else { return };
+    let Some(photo) = app.viewport.own_photo_index().or_else(|| view::nearest_photo(app, &held)) else { return };
     let seed = dataset.photos[photo].name.clone();
     let step = FoundStep { what: format!("added objects from {seed}"), adds: true };
     start_search(app, SearchScope { add: Some((known, seed)), ..SearchScope::default() }, Some(step));
