@@ -157,6 +157,7 @@ fn compare(
         pictures: None,
         state: scene.state.clone(),
         changed: ChangedScene::default(),
+        fit: None,
     };
     let mut labels = FileMasks(Labels::of_photos(&input.labels, &dataset.photos)?);
     let views = evaluate_masks::draw(&comparison, &map, &mut labels, &compared, split.trained_on)?;
