@@ -153,7 +153,6 @@ fn compare(
         trained_on: vec![split.trained_on; compared.len()],
         max_side_px: settings.train.max_side_px,
         borders: None,
-        fit: None,
         pictures: None,
         state: scene.state.clone(),
         changed: ChangedScene::default(),
