@@ -26,7 +26,9 @@ elif step == "matches":
     pycolmap.match_exhaustive(database)
 elif step == "mapping":
     found = 0
-    if hasattr(pycolmap, "global_mapping"):
+    # Global mapping may place photos on a handful of points, and bend all with them; it is for many photos.
+    many = len(os.listdir(images)) > 150
+    if many and hasattr(pycolmap, "global_mapping"):
         try:
             found = registered(pycolmap.global_mapping(database, images, sparse))
         except Exception as error:
