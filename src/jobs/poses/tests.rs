@@ -21,7 +21,7 @@ case "$1" in
 help) echo "COLMAP 3.8 (without CUDA)" ;;
 feature_extractor)
   [ "$2" = "-h" ] && { echo "  --SiftExtraction.use_gpu arg (=1)"; exit 0; }
-  echo "Processed file [1/3]" >&2; echo "Processed file [3/3]" ;;
+  echo matches > "$3"; echo "Processed file [1/3]" >&2; echo "Processed file [3/3]" ;;
 exhaustive_matcher) echo "Matching block [1/1, 1/1] in 0.1s"; MATCHING ;;
 mapper)
   echo "=> Registered"; echo "Registering image #2 (3)"

@@ -99,7 +99,7 @@ pub enum LocateError {
     TooSmall(u32, u32),
     #[error(transparent)]
     Render(#[from] RenderError),
-    #[error(transparent)]
+    #[error("canceled")]
     Interrupted(#[from] Interrupted),
 }
 
