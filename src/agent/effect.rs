@@ -31,7 +31,7 @@ pub enum Effect {
     Explored(Arc<Explored>),
 }
 
-/// What is as it was before a request.
+/// Things as they were before a request.
 #[derive(Clone, Debug, Default)]
 pub struct UndoneRequest {
     /// Identities that are hidden again; `None` if the request changed none.

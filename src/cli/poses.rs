@@ -40,7 +40,7 @@ pub(crate) struct PosesArgs {
     /// Number of photos from a video [default: 100 to 300, by how much the picture changes]
     #[arg(long, value_parser = number::within(3..=10_000_usize))]
     frames: Option<usize>,
-    /// Where no maker is here, get pycolmap into an environment of this program
+    /// Get pycolmap, where no maker is here, into an environment of this program
     #[arg(long)]
     install: bool,
     /// Posed photos of the same names to compare with, after the best similarity

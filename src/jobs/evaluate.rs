@@ -35,7 +35,7 @@ pub(crate) struct EvaluateOptions {
     pub(crate) keep_borders: bool,
     /// Folder for pictures: photo, render and difference side by side.
     pub(crate) pictures: Option<PathBuf>,
-    /// What is fitted of each photo for a second score, beside what training learned of its own photos.
+    /// Parts of each photo that are fitted for a second score, beside what training learned of its own photos.
     pub(crate) fit: FittedParts,
 }
 
@@ -55,7 +55,7 @@ pub(crate) struct PhotoComparison {
     pub(crate) state: Option<String>,
     /// Differences between the scene and its photos.
     pub(crate) changed: ChangedScene,
-    /// What is fitted of each photo for a second score.
+    /// Parts of each photo that are fitted for a second score.
     pub(crate) fit: Option<FittedParts>,
 }
 

@@ -54,7 +54,7 @@ pub struct Evaluation {
     pub fitted: Option<FittedScore>,
 }
 
-/// What is fitted of a held-out photo before it is scored.
+/// Parts that are fitted of a held-out photo before it is scored.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct FittedParts {
     /// Its pose, to the trained scene.
@@ -82,7 +82,7 @@ impl FittedParts {
 /// Quality on the held-out photos after a fit.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct FittedScore {
-    /// What was fitted.
+    /// Parts that were fitted.
     #[serde(flatten)]
     pub parts: FittedParts,
     /// Mean PSNR in dB over the views.

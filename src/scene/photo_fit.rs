@@ -1,4 +1,4 @@
-//! What a training found out about a photo beside the scene: how its pose was off, and its exposure.
+//! Facts that a training found out about a photo beside the scene: how its pose was off, and its exposure.
 
 use serde::{Deserialize, Serialize};
 

@@ -33,12 +33,12 @@ const LEAST_GROWTH: f64 = 0.25;
 /// Steps on old photos for each on an added one: the old photos are many, and must not get worse.
 const OLD_STEPS: usize = 2;
 
-/// What is refined, for the report.
+/// Number of Gaussians that are refined, for the report.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 pub(crate) struct RefinedShare {
     /// Gaussians of the scene before.
     pub(crate) gaussians: usize,
-    /// Those that stay bit for bit.
+    /// Number of those that stay bit for bit.
     pub(crate) frozen: usize,
 }
 

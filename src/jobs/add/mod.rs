@@ -139,7 +139,7 @@ fn earlier(list: &JoinedPhotos) -> usize {
     list.request.get("earlier").and_then(serde_json::Value::as_u64).unwrap_or(0) as usize
 }
 
-/// What makes a run the same as an earlier one.
+/// Facts that make a run the same as an earlier one.
 fn request(scene: &Scene, paths: &[PathBuf], options: &AddOptions) -> serde_json::Value {
     json!({
         "version": 1, "scene": scene.folder.as_deref().map(files::real), "state": scene.state,

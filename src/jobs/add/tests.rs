@@ -1,3 +1,5 @@
+//! Photos added to a made-up scene.
+
 use std::collections::BTreeMap;
 
 use glam::DVec3;

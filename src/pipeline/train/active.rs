@@ -155,7 +155,7 @@ pub(crate) fn shares(
 
 /// Fit of a photo to the scene.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct PhotoFit {
+pub(crate) struct AddedPhotoFit {
     /// Gain of its colors against the scene's, by channel.
     pub(crate) gain: [f32; 3],
     /// False if it does not show the scene at its pose.
@@ -168,10 +168,10 @@ pub(crate) fn fit(
     cloud: &GaussianCloud,
     view: &TrainView,
     settings: &RenderSettings,
-) -> Result<PhotoFit, TrainError> {
+) -> Result<AddedPhotoFit, TrainError> {
     let frame = renderer.render(cloud, Features::NONE, &view.camera, settings);
     let frame = frame.map_err(|e| TrainError::Render(view.name.clone(), e))?;
-    Ok(PhotoFit { gain: gain(&frame, view), fits: is_alike(&frame, view) })
+    Ok(AddedPhotoFit { gain: gain(&frame, view), fits: is_alike(&frame, view) })
 }
 
 /// Returns the view without its gain.

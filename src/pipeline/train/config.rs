@@ -162,7 +162,7 @@ impl TrainConfig {
         }
     }
 
-    /// What is fitted of a held-out photo before it is scored a second time: as much as of the training photos.
+    /// Parts of a held-out photo that are fitted before it is scored a second time: as much as of the training photos.
     pub(crate) fn held_out_fit(&self) -> Option<FittedParts> {
         FittedParts { pose: self.refine_poses, exposure: self.exposure }.some()
     }

@@ -3,7 +3,8 @@
 
 use super::TrainView;
 use super::photo_fits::PhotoFits;
-use super::poses::{MOVE_DEVIATION, PoseOffset, PoseRefiner};
+use super::pose_offset::{MOVE_DEVIATION, PoseOffset, TURN_DEVIATION};
+use super::poses::PoseRefiner;
 use crate::io::trained::SceneInfo;
 use crate::math::stats::median;
 use crate::pipeline::observer::{Observer, Severity};
@@ -68,8 +69,7 @@ fn of_poses(poses: &PoseRefiner, views: &[TrainView]) -> (String, Option<String>
         median(&of(0)),
         median(&of(1)),
     );
-    let usual =
-        [median(&of(0)).max(100.0 * MOVE_DEVIATION), median(&of(1)).max(super::poses::TURN_DEVIATION.to_degrees())];
+    let usual = [median(&of(0)).max(100.0 * MOVE_DEVIATION), median(&of(1)).max(TURN_DEVIATION.to_degrees())];
     let times = |d: &[f64; 2]| (d[0] / usual[0]).max(d[1] / usual[1]);
     let mut far: Vec<usize> = (0..all.len()).filter(|i| times(&all[*i]) > FAR).collect();
     far.sort_by(|a, b| times(&all[*b]).total_cmp(&times(&all[*a])));

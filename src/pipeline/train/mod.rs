@@ -25,6 +25,7 @@ mod outcome;
 pub(crate) mod photo_fits;
 mod photos;
 mod pose_gauge;
+mod pose_offset;
 pub(crate) mod poses;
 pub(crate) mod refine;
 mod resume;

@@ -1,4 +1,4 @@
-//! What training learns of each photo beside the scene: its pose ([`poses`](super::poses)) and its exposure
+//! Facts that training learns of each photo beside the scene: its pose ([`poses`](super::poses)) and its exposure
 //! ([`mod@exposure`](super::exposure)). On the CPU, whose rasterizer has gradients of poses.
 
 use std::borrow::Cow;
@@ -7,7 +7,8 @@ use serde::{Deserialize, Serialize};
 
 use super::device::LAMBDA;
 use super::exposure::{self, ExposureFit};
-use super::poses::{PoseOffset, PoseRefiner, PoseSlope};
+use super::pose_offset::PoseOffset;
+use super::poses::{PoseRefiner, PoseSlope};
 use super::{TrainConfig, TrainView};
 use crate::pipeline::locate::curvature;
 use crate::render::{DifferentiableRenderer, Frame, FrameGradient};
@@ -27,7 +28,7 @@ pub(super) struct FitStep {
     pub(super) background: [f32; 3],
 }
 
-/// What a checkpoint keeps of a photo.
+/// Record of a photo in a checkpoint.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct StoredFit {
     pub(crate) name: String,
@@ -47,7 +48,7 @@ pub(crate) struct PhotoFits {
 }
 
 impl PhotoFits {
-    /// What a run in a scene of this radius learns of its photos, of those that are `free`; the others keep what they
+    /// Returns what a run in a scene of this radius learns of its photos, of those that are `free`; the others keep what they
     /// have.
     pub(crate) fn new(config: &TrainConfig, views: &[TrainView], free: &[bool], extent: f64) -> Self {
         let given = || views.iter().map(|v| v.camera.clone()).collect();
@@ -58,7 +59,7 @@ impl PhotoFits {
         }
     }
 
-    /// What a checkpoint keeps of the photos of these views.
+    /// Returns what a checkpoint keeps of the photos of these views.
     pub(crate) fn stored(&self, views: &[TrainView]) -> Vec<StoredFit> {
         if !self.is_on() {
             return Vec::new();

@@ -2,7 +2,7 @@
 
 use glam::{DMat3, DVec3};
 
-use super::poses::{MOVE_DEVIATION, PoseOffset, TURN_DEVIATION};
+use super::pose_offset::{MOVE_DEVIATION, PoseOffset, TURN_DEVIATION};
 use crate::scene::Camera;
 
 /// Similarities of a set of cameras, for small changes.

@@ -109,12 +109,6 @@ impl CameraPane {
         self.player.tick(step_secs)
     }
 
-    /// True if a flight plays, waits, or is paused on its way.
-    pub(crate) fn is_on_way(&self) -> bool {
-        let is_paused = matches!(self.player.clip(), Some(clip @ Clip::Flight(_)) if self.player.time < clip.seconds());
-        self.player.playing || is_paused || !self.next.is_empty()
-    }
-
     /// True if there is a flight or a path to play.
     pub(crate) fn has_clip(&self) -> bool {
         self.player.clip().is_some() || !self.path.keys.is_empty()

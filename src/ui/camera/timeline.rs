@@ -126,3 +126,11 @@ fn between_neighbors(pane: &CameraPane, key: usize, time: f64, times: &[[f64; 2]
     let highest = times.get(key + 1).map_or(f64::INFINITY, |t| t[0] - wait - GAP);
     time.clamp(lowest, highest.max(lowest))
 }
+
+impl CameraPane {
+    /// True if a flight plays, waits, or is paused on its way.
+    pub(crate) fn is_on_way(&self) -> bool {
+        let is_paused = matches!(self.player.clip(), Some(clip @ Clip::Flight(_)) if self.player.time < clip.seconds());
+        self.player.playing || is_paused || !self.next.is_empty()
+    }
+}

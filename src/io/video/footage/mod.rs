@@ -97,7 +97,7 @@ impl Footage {
     /// Hands each frame with its number to `visit`, until that fails.
     ///
     /// # Errors
-    /// Those of `visit`, and of frames that cannot be decoded.
+    /// Errors of `visit`, and of frames that cannot be decoded.
     pub(crate) fn visit<E: From<FootageError>>(
         &self,
         visit: &mut dyn FnMut(usize, &VideoFrame<'_>) -> Result<(), E>,

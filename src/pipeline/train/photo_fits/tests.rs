@@ -7,7 +7,7 @@ use rand_pcg::Pcg64Mcg;
 use super::*;
 use crate::math::stats::mean;
 use crate::pipeline::metrics;
-use crate::pipeline::train::poses::{MOVE_DEVIATION, TURN_DEVIATION};
+use crate::pipeline::train::pose_offset::{MOVE_DEVIATION, TURN_DEVIATION};
 use crate::pipeline::train::trainer::Trainer;
 use crate::render::{BackendChoice, Features, RenderSettings, Renderer};
 use crate::scene::PhotoPixels;

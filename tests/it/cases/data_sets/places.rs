@@ -158,7 +158,7 @@ fn lists_of_another_name_and_photos_beside_their_list_are_opened() {
     // Poses that nobody here reads are named.
     fs::remove_file(set.at("transforms_colmap.json")).expect("remove");
     fs::remove_file(set.at("transforms_other.json")).expect("remove");
-    assert!(refusal(set.path()).contains("8 photos, no camera poses. "), "the control");
+    assert!(refusal(set.path()).contains("8 photos, no camera poses; "), "the control");
     fs::write(set.at("sfm_data.json"), "{}").expect("write");
     let e = refusal(set.path());
     assert!(e.contains("8 photos, no camera poses (sfm_data.json may hold poses"), "{e}");
