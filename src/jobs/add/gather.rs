@@ -180,14 +180,14 @@ mod tests {
         for name in ["new/a/1.png", "new/b/1.png"] {
             image::RgbImage::from_pixel(32, 24, image::Rgb([90; 3])).save(at(name)).expect("written");
         }
-        // Its header is right, its pixels are not there.
-        let whole = std::fs::read(at("new/a/1.png")).expect("read");
-        std::fs::write(at("new/cut.png"), &whole[..40]).expect("written");
+        image::RgbImage::new(4, 3).save(at("new/speck.png")).expect("written");
         let frame = |name: &str| {
             serde_json::json!({ "file_path": name, "transform_matrix": opengl_pose(&camera),
                 "w": 32, "h": 24, "fl_x": camera.focal_px.x })
         };
-        let list = serde_json::json!({ "frames": [frame("a/1.png"), frame("b/1.png"), frame("cut.png")] });
+        let mut speck = frame("speck.png");
+        (speck["w"], speck["h"]) = (4.into(), 3.into());
+        let list = serde_json::json!({ "frames": [frame("a/1.png"), frame("b/1.png"), speck] });
         std::fs::write(at("new/transforms.json"), list.to_string()).expect("written");
         let own = Photo::new("added/1.png", at("own.png"), camera.clone());
         let dataset = Dataset { photos: vec![own], ..Dataset::default() };
@@ -196,7 +196,7 @@ mod tests {
         assert_eq!(names, ["added/2/1.png", "added/3/1.png"]);
         assert!(found.added.iter().all(|p| !p.located && p.camera.center.distance(camera.center) < 1e-9));
         assert_eq!(found.refused.len(), 1);
-        assert!(found.refused[0].photo.ends_with("cut.png"), "{:?}", found.refused);
+        assert!(found.refused[0].photo.ends_with("speck.png"), "{:?}", found.refused);
         let gone = gather(&Scene::default(), &dataset, &[at("gone")], None, &mut Silent).expect_err("gone").to_string();
         assert!(gone.contains("does not exist"), "{gone}");
     }
