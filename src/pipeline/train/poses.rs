@@ -9,8 +9,6 @@
 //! off by. What no photo can tell, a move, turn and change of size of everything, is taken out after each step
 //! ([`PoseGauge`]), unless some poses are held, which then hold the others.
 
-use glam::DVec3;
-
 use super::pose_gauge::PoseGauge;
 use super::pose_offset::{MOVE_DEVIATION, PoseOffset, TURN_DEVIATION};
 use crate::math::cholesky::solve;
@@ -128,6 +126,8 @@ impl PoseRefiner {
 
 #[cfg(test)]
 mod tests {
+    use glam::DVec3;
+
     use super::*;
 
     fn camera(k: usize) -> Camera {
