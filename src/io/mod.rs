@@ -15,6 +15,7 @@ mod compressed_ply;
 pub(crate) mod data_folder;
 pub(crate) mod error;
 pub(crate) mod exif;
+pub(crate) mod file_stamp;
 pub(crate) mod files;
 mod finite;
 pub(crate) mod folder_lock;

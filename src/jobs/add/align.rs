@@ -9,6 +9,7 @@ use crate::io::files;
 use crate::jobs::JobError;
 use crate::math::format::things;
 use crate::math::rotation::{nearest_rotation, rotation_error};
+use crate::navigate::pose;
 use crate::scene::{Camera, Dataset, Photo};
 
 /// Fewest photos in common that give a frame.
@@ -63,11 +64,7 @@ impl FrameChange {
             pairs.iter().map(|[a, b]| off(a, &change.applied(b))).fold(0.0, f64::max)
         };
         let off = worst(&|a, b| a.center.distance(b.center) / own);
-        let cosine = |a: &Camera, b: &Camera| {
-            let turn = a.world_from_camera * b.world_from_camera.transpose();
-            ((turn.x_axis.x + turn.y_axis.y + turn.z_axis.z - 1.0) / 2.0).clamp(-1.0, 1.0)
-        };
-        let turned = worst(&|a, b| cosine(a, b).acos().to_degrees());
+        let turned = worst(&|a, b| pose::angle(&a.world_from_camera, &b.world_from_camera).to_degrees());
         if off > OFF || turned > TURNED_DEG || rotation_error(&rotation) > SAME {
             return Err(format!(
                 "the poses of the {} in common disagree, by {:.0} % of their spread and {turned:.1} degrees",

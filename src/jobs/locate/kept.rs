@@ -1,10 +1,11 @@
 //! A scene in which photos are located one after another: looked at once, with the first photo, and for the next ones.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, TryLockError};
-use std::time::{Duration, SystemTime};
+use std::time::Duration;
 
 use super::{DEFAULT_PX, LocateJob, LocateOptions, LocatedPhoto};
+use crate::io::file_stamp::FileStamp;
 use crate::jobs::{JobError, OpenedScene, Scene, open};
 use crate::pipeline::observer::{Observer, begin};
 use crate::render::RenderSettings;
@@ -15,27 +16,11 @@ const PATIENCE: Duration = Duration::from_millis(20);
 
 const OPTIONS: LocateOptions = LocateOptions { focal_px: None, finest_px: DEFAULT_PX, dataset: None };
 
-/// State of a file: it is the same as long as this is.
-#[derive(Clone, Debug, PartialEq)]
-struct FileStamp {
-    path: PathBuf,
-    bytes: u64,
-    changed: Option<SystemTime>,
-}
-
-impl FileStamp {
-    fn of(path: &Path) -> Self {
-        let facts = path.metadata().ok();
-        let bytes = facts.as_ref().map_or(0, std::fs::Metadata::len);
-        Self { path: path.into(), bytes, changed: facts.and_then(|f| f.modified().ok()) }
-    }
-}
-
 #[derive(Default)]
 struct Kept {
     job: Option<LocateJob>,
     /// Photos that were located, the newest last.
-    known: Vec<(FileStamp, LocatedPhoto)>,
+    known: Vec<(Option<FileStamp>, LocatedPhoto)>,
 }
 
 struct LocatorParts {
@@ -87,9 +72,9 @@ impl PhotoLocator {
     /// If the observer asks to stop, or the scene cannot be looked at.
     pub(crate) fn locate(&self, path: &Path, observer: &mut dyn Observer) -> Result<LocatedPhoto, JobError> {
         let path = path.canonicalize().unwrap_or_else(|_| path.into());
-        let stamp = FileStamp::of(&path);
+        let stamp = FileStamp::of(&path).ok();
         let mut kept = self.lock(observer)?;
-        if let Some((_, found)) = kept.known.iter().find(|(known, _)| *known == stamp) {
+        if let Some((_, found)) = kept.known.iter().find(|(known, found)| *known == stamp && found.photo == path) {
             return Ok(found.clone());
         }
         let job = match kept.job.take() {
@@ -99,7 +84,7 @@ impl PhotoLocator {
         let job = kept.job.insert(job);
         begin("Matching the photo", observer)?;
         let found = job.locate(&path, &OPTIONS, observer)?;
-        kept.known.retain(|(known, _)| known.path != path);
+        kept.known.retain(|(_, known)| known.photo != path);
         kept.known.push((stamp, found.clone()));
         Ok(found)
     }

@@ -8,6 +8,7 @@ use serde::Serialize;
 use crate::jobs::JobError;
 use crate::math::rotation::{nearest_rotation, rotation_error};
 use crate::math::stats::{mean, median, worst};
+use crate::navigate::pose;
 use crate::scene::{Camera, Dataset, Photo};
 
 /// Fewest photos that can be aligned.
@@ -49,14 +50,8 @@ pub(crate) fn compare(found: &Dataset, given: &Dataset) -> Result<PoseComparison
     let fit = Similarity::fit(&centers).ok_or_else(too_few)?;
     let (_, radius) = Camera::extent_of(pairs.iter().map(|(_, g)| *g));
     let distances: Vec<f64> = centers.iter().map(|[f, g]| fit.apply(*f).distance(*g) / radius).collect();
-    let angle = |(f, g): &(&Camera, &Camera)| {
-        let turn = (fit.rotation * toward_middle(f)).transpose() * toward_middle(g);
-        // The sine by the antisymmetric part: exact for small angles.
-        let sine =
-            DVec3::new(turn.y_axis.z - turn.z_axis.y, turn.z_axis.x - turn.x_axis.z, turn.x_axis.y - turn.y_axis.x);
-        let trace = turn.x_axis.x + turn.y_axis.y + turn.z_axis.z;
-        sine.length().atan2(trace - 1.0).to_degrees()
-    };
+    let angle =
+        |(f, g): &(&Camera, &Camera)| pose::angle(&(fit.rotation * toward_middle(f)), &toward_middle(g)).to_degrees();
     let angles: Vec<f64> = pairs.iter().map(angle).collect();
     let ratios: Vec<f64> = pairs
         .iter()

@@ -1,6 +1,6 @@
 //! The whole way from a folder of photos or a video to poses, for window and command line.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use super::maker::MakerPlaces;
 use super::{FoundPoses, MakerKind, environment, find, makers, source, usual_out};
@@ -105,11 +105,7 @@ impl FoundPoses {
 /// Name for titles of what was opened: of a folder `images` the one above.
 pub(crate) fn name_of(photos: &Unposed) -> String {
     match &photos.video {
-        Some(video) => stem(video),
+        Some(video) => source::stem(video),
         None => crate::io::files::data_set_name(&photos.folder),
     }
-}
-
-fn stem(path: &Path) -> String {
-    path.file_stem().map_or_else(|| "video".into(), |stem| stem.to_string_lossy().into_owned())
 }

@@ -7,6 +7,7 @@ use image::codecs::jpeg::JpegEncoder;
 use serde::{Deserialize, Serialize};
 
 use crate::io::error::write_error;
+use crate::io::file_stamp::FileStamp;
 use crate::io::temporary::temporary_folder;
 use crate::io::unposed::Unposed;
 use crate::io::video::footage::{Footage, FootageError, VideoFrame};
@@ -26,17 +27,20 @@ const FEWEST: usize = 3;
 #[derive(Debug, PartialEq, Eq, Serialize, Deserialize)]
 struct VideoNote {
     video: String,
-    bytes: u64,
-    /// Nanoseconds since 1970.
-    modified_nanos: u64,
+    #[serde(flatten)]
+    stamp: FileStamp,
     /// Number of photos that was asked for.
     wanted: Option<usize>,
 }
 
+/// Name of a video without its ending.
+pub(super) fn stem(video: &Path) -> String {
+    video.file_stem().map_or_else(|| "video".into(), |stem| stem.to_string_lossy().into_owned())
+}
+
 /// Folder beside a video for its photos.
 pub(crate) fn folder_of(video: &Path) -> PathBuf {
-    let stem = video.file_stem().map_or_else(|| "video".into(), |stem| stem.to_string_lossy().into_owned());
-    video.with_file_name(format!("{stem}-photos"))
+    video.with_file_name(format!("{}-photos", stem(video)))
 }
 
 /// Takes photos from a video. Photos that an earlier call took are used again.
@@ -66,10 +70,8 @@ pub(crate) fn photos_of(video: &Path, wanted: Option<usize>, observer: &mut dyn 
 }
 
 fn note(video: &Path, wanted: Option<usize>) -> Result<VideoNote, JobError> {
-    let meta = fs::metadata(video).map_err(|cause| IoError::Read { path: video.into(), cause })?;
-    let since = meta.modified().ok().and_then(|t| t.duration_since(std::time::UNIX_EPOCH).ok());
     let name = video.file_name().unwrap_or_default().to_string_lossy().into_owned();
-    Ok(VideoNote { video: name, bytes: meta.len(), modified_nanos: since.map_or(0, |s| s.as_nanos() as u64), wanted })
+    Ok(VideoNote { video: name, stamp: FileStamp::of(video)?, wanted })
 }
 
 /// Reads the video twice: to look at all frames, and to store the chosen ones.

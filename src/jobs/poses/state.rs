@@ -5,8 +5,9 @@ use std::path::Path;
 use serde::{Deserialize, Serialize};
 
 use super::{DATABASE, FoundPoses, IMAGES, MakerKind, MakerStep, PoseMaker, SPARSE, remove};
+use crate::io::file_stamp::FileStamp;
+use crate::io::files;
 use crate::io::unposed::Unposed;
-use crate::io::{IoError, files};
 use crate::jobs::{JobError, export};
 
 /// Name of the note.
@@ -16,9 +17,8 @@ pub(super) const FILE: &str = "poses.json";
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 struct KnownPhoto {
     name: String,
-    bytes: u64,
-    /// Nanoseconds since 1970.
-    modified_nanos: u64,
+    #[serde(flatten)]
+    stamp: FileStamp,
 }
 
 /// Note on poses in a folder.
@@ -72,14 +72,8 @@ impl PoseState {
 
 fn known(photos: &Unposed) -> Result<Vec<KnownPhoto>, JobError> {
     let of = |name: &String| {
-        let path = photos.images.join(name);
-        let meta = std::fs::metadata(&path).map_err(|cause| IoError::Read { path, cause })?;
-        let since = meta.modified().ok().and_then(|t| t.duration_since(std::time::UNIX_EPOCH).ok());
-        Ok(KnownPhoto {
-            name: name.clone(),
-            bytes: meta.len(),
-            modified_nanos: since.map_or(0, |since| since.as_nanos() as u64),
-        })
+        let stamp = FileStamp::of(&photos.images.join(name))?;
+        Ok(KnownPhoto { name: name.clone(), stamp })
     };
     photos.photos.iter().map(of).collect()
 }
