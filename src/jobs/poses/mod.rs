@@ -93,17 +93,17 @@ impl PoseWork<'_> {
     }
 }
 
-/// Finds the poses of photos with this maker, in `out`. Steps that an earlier call finished there are not done again.
+/// Finds the poses of photos with this maker, in `out`, which `is_own` if the program chose it. Steps that an earlier call finished there are not done again.
 ///
 /// # Errors
 /// If the maker fails or finds nothing, `out` holds something else, or the observer asks to stop.
 pub(crate) fn find(
     photos: &Unposed,
     maker: &dyn PoseMaker,
-    out: &Path,
+    (out, is_own): (&Path, bool),
     observer: &mut dyn Observer,
 ) -> Result<FoundPoses, JobError> {
-    check_out(photos, out)?;
+    check_out(photos, out, is_own)?;
     export::make_folder(out)?;
     let _lock = FolderLock::take(out, "camera poses")?;
     let mut state = PoseState::resume(photos, maker, out)?;
@@ -145,7 +145,7 @@ pub(crate) fn usual_out(photos: &Unposed, folders: &Folders) -> PathBuf {
 }
 
 /// Refuses a folder that holds something else than poses of these photos.
-fn check_out(photos: &Unposed, out: &Path) -> Result<(), JobError> {
+fn check_out(photos: &Unposed, out: &Path, is_own: bool) -> Result<(), JobError> {
     let real = files::real(out);
     if real == files::real(&photos.folder) || real.join(IMAGES) == files::real(&photos.images) {
         return Err(JobError::Output(format!(
@@ -153,7 +153,8 @@ fn check_out(photos: &Unposed, out: &Path) -> Result<(), JobError> {
             out.display()
         )));
     }
-    if files::holds_something(out) && !PoseState::is_in(out) && !is_earlier(out) {
+    // Earlier versions left no note, but worked in the program's own folders only; elsewhere it is somebody's work.
+    if files::holds_something(out) && !PoseState::is_in(out) && !(is_own && is_earlier(out)) {
         return Err(JobError::Output(format!(
             "'{}' holds something else than camera poses that this program found; choose another folder",
             out.display()

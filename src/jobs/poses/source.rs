@@ -18,6 +18,8 @@ use crate::pipeline::observer::{Observer, Ticker};
 
 /// Name of the note beside the photos.
 const NOTE: &str = "video.json";
+/// Beginning of the names of its photos.
+const FRAME: &str = "frame_";
 /// Quality of the photos as JPEG.
 const QUALITY: u8 = 95;
 /// Fewest photos that poses are found of.
@@ -51,7 +53,10 @@ pub(crate) fn photos_of(video: &Path, wanted: Option<usize>, observer: &mut dyn 
     let folder = folder_of(video);
     let note = note(video, wanted)?;
     let earlier = files::read_json::<VideoNote>(&folder.join(NOTE)).ok();
-    if files::holds_something(&folder) && earlier.is_none() {
+    // What somebody put beside the photos would go with those of an earlier state of the video.
+    let is_of_video = |name: &String| name == NOTE || name.starts_with(FRAME);
+    let is_ours = earlier.is_some() && files::names_in(&folder).is_ok_and(|names| names.iter().all(is_of_video));
+    if files::holds_something(&folder) && earlier.as_ref() != Some(&note) && !is_ours {
         return Err(JobError::Output(format!(
             "the photos of '{}' belong into '{}', which holds something else; rename one of the two",
             video.display(),
@@ -102,8 +107,8 @@ fn take(video: &Path, note: &VideoNote, folder: &Path, observer: &mut dyn Observ
         let mut bytes = Vec::new();
         let encoder = JpegEncoder::new_with_quality(&mut bytes, QUALITY);
         picture.write_with_encoder(encoder).map_err(|e| reason(e.to_string()))?;
-        let path = draft.folder.path().join(format!("frame_{i:06}.jpg"));
-        Ok(fs::write(&path, bytes).map_err(|cause| write_error(&folder.join(format!("frame_{i:06}.jpg")), cause))?)
+        let path = draft.folder.path().join(format!("{FRAME}{i:06}.jpg"));
+        Ok(fs::write(&path, bytes).map_err(|cause| write_error(&folder.join(format!("{FRAME}{i:06}.jpg")), cause))?)
     })?;
     export::json(&draft.folder.path().join(NOTE), note)?;
     // Photos of an earlier state of the video go with this folder.

@@ -187,6 +187,27 @@ fn finished_steps_are_not_done_again() {
 }
 
 #[test]
+fn somebodys_own_colmap_project_is_no_place_for_poses() {
+    let fake = Fake::new("true");
+    let here = fake.guard.path();
+    let project = here.join("project");
+    for name in ["images/mine.png", "sparse/0/images.bin", "database.db"] {
+        let path = project.join(name);
+        fs::create_dir_all(path.parent().expect("a folder")).and_then(|()| fs::write(path, "mine")).expect("written");
+    }
+    let places = MakerPlaces { path: here.into(), ..MakerPlaces::default() };
+    let folders = Folders { data: here.join("data") };
+    let request = PoseRequest { photos: fake.photos.clone(), out: Some(project.clone()), ..PoseRequest::default() };
+    let text = find_in(&request, &places, &folders, &mut Silent).expect_err("refused").to_string();
+    assert!(text.contains("holds something else"), "{text}");
+    assert_eq!(fs::read(project.join("images/mine.png")).expect("there"), b"mine");
+    // The control: the same in the program's own folder is the work of an earlier version.
+    let own = usual_out(&fake.photos, &folders);
+    fs::create_dir_all(own.parent().expect("a folder")).and_then(|()| fs::rename(&project, &own)).expect("moved");
+    fake.find(&mut Silent).expect("found");
+}
+
+#[test]
 fn a_new_colmap_maps_globally_and_again_where_few_photos_get_a_pose() {
     let fake = Fake::new("true");
     let program = fake.guard.path().join("colmap");

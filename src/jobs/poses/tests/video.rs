@@ -57,6 +57,12 @@ fn a_video_becomes_photos_once_and_never_among_other_files() {
     assert_eq!(few.photos.len(), 4);
     assert!(few.photos.iter().all(|name| !["000001", "000004", "000007"].iter().any(|n| name.contains(n))), "{few:?}");
     assert_eq!(listed(folder.path()), ["walk-photos", "walk.mp4"], "nothing is left beside");
+    // Something of somebody's own beside the photos stays: other photos would take its place.
+    let mask = few.images.join("mask.png");
+    fs::write(&mask, "mine").expect("written");
+    let text = photos_of(&path, None, &mut Silent).expect_err("taken").to_string();
+    assert!(text.contains("holds something else") && mask.is_file(), "{text}");
+    fs::remove_file(mask).expect("removed");
     // Somebody's own folder of that name.
     fs::remove_file(few.images.join("video.json")).expect("removed");
     let text = photos_of(&path, Some(4), &mut Silent).expect_err("taken").to_string();
