@@ -325,4 +325,6 @@ fn covariance(curvature: &Curvature, focal: FocalKnowledge) -> Option<Curvature>
 }
 
 #[cfg(test)]
+pub(crate) mod testing;
+#[cfg(test)]
 mod tests;

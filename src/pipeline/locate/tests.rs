@@ -4,44 +4,13 @@ use glam::{DMat3, DQuat, DVec3};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 
+use super::testing::{at, scene, settings};
 use super::*;
 use crate::pipeline::observer::Silent;
 use crate::render::{Features, Renderer};
 
-/// Colored Gaussians of many sizes over a bumpy floor.
-fn scene(seed: u64) -> Arc<GaussianCloud> {
-    let mut rng = Pcg64Mcg::seed_from_u64(seed);
-    let mut v = |scale: f32| rng.random_range(-scale..scale);
-    let n = 2500;
-    let positions: Vec<[f32; 3]> = (0..n)
-        .map(|i| {
-            let (x, y) = (v(1.8), v(1.8));
-            let hill = 0.5 * (x * 1.9 + seed as f32).sin() * (y * 1.4).cos();
-            [x, y, hill + if i % 3 == 0 { 0.2 + v(0.2) } else { 0.0 }]
-        })
-        .collect();
-    Arc::new(GaussianCloud {
-        log_scales: (0..n).map(|i| [0; 3].map(|_| v(0.6) - if i % 4 == 0 { 2.2 } else { 3.0 })).collect(),
-        quaternions: (0..n).map(|_| [0; 4].map(|_| v(1.0))).collect(),
-        opacity_logits: (0..n).map(|_| 2.5 + v(1.0)).collect(),
-        sh_degree: 0,
-        sh: (0..n).map(|_| [v(1.6), v(1.6), v(1.6)]).collect(),
-        positions,
-        ..GaussianCloud::default()
-    })
-}
-
-fn at(turn: f64, height: f64, distance: f64) -> Camera {
-    let eye = DVec3::new(distance * turn.cos(), distance * turn.sin(), height);
-    Camera::look_at(eye, DVec3::new(0.1, 0.0, 0.0), DVec3::Z, 0.75, 320, 240).expect("valid")
-}
-
 fn ring() -> Vec<Camera> {
     (0..20).map(|i| at(f64::from(i) / 20.0 * std::f64::consts::TAU, 2.2, 3.6)).collect()
-}
-
-fn settings() -> RenderSettings {
-    RenderSettings { background: [0.2, 0.25, 0.3], ..RenderSettings::default() }
 }
 
 fn locator() -> Locator {
