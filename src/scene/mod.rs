@@ -23,7 +23,7 @@ pub(crate) mod photo_fit;
 pub mod plan;
 pub(crate) mod preparation;
 pub mod resource_log;
-mod rig;
+pub(crate) mod rig;
 pub(crate) mod semantic_map;
 pub(crate) mod shapes;
 pub(crate) mod support;

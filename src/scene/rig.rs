@@ -13,7 +13,7 @@ const FEW: usize = 10;
 const LEAST: usize = 5;
 
 /// Flags of the camera centers that are far from all others.
-pub(super) fn strays(centers: &[DVec3]) -> Vec<bool> {
+pub(crate) fn strays(centers: &[DVec3]) -> Vec<bool> {
     let none = vec![false; centers.len()];
     if centers.len() < LEAST {
         return none;

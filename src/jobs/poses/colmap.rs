@@ -1,4 +1,4 @@
-//! COLMAP as a program. Its own global mapper (since version 4) is taken, else GLOMAP, else the incremental one.
+//! COLMAP as a program, with two mappers: an incremental one, and a global one (its own since version 4, else GLOMAP).
 
 use std::path::{Path, PathBuf};
 
@@ -82,34 +82,40 @@ impl Colmap {
         stage
     }
 
-    /// Maps the fast way, and by the incremental mapper too if few photos got a pose; the result of most photos stays.
-    fn map(&self, general: &str, work: &PoseWork<'_>, observer: &mut dyn Observer) -> Result<(), JobError> {
+    /// Ways to map, the better one for these photos first.
+    fn ways(&self, general: &str, work: &PoseWork<'_>) -> Vec<(&'static str, bool)> {
         let has_global = general.split_whitespace().any(|word| word == "global_mapper");
-        let fast = match (has_global, &self.glomap) {
-            (true, _) => Some(("global_mapper", false)),
-            (false, Some(_)) => Some(("mapper", true)),
-            (false, None) => None,
-        };
-        let Some((command, with_glomap)) = fast else {
-            return process::run(&self.mapping("mapper", false, work, &work.sparse), work.photos.len(), observer);
-        };
-        let first = process::run(&self.mapping(command, with_glomap, work, &work.sparse), work.photos.len(), observer);
-        if first.as_ref().is_err_and(JobError::is_cancelled) {
-            return first;
+        let global = if has_global { Some(("global_mapper", false)) } else { self.glomap.as_ref().map(|_| ("mapper", true)) };
+        let mut ways: Vec<_> = std::iter::once(("mapper", false)).chain(global).collect();
+        if work.maps_globally() {
+            ways.reverse();
         }
-        if first.is_ok() && registered(&work.sparse) as f64 >= ENOUGH * work.photos.len() as f64 {
-            return Ok(());
+        ways
+    }
+
+    /// Maps one way, and another way too if few photos got a pose; the result of most photos stays.
+    fn map(&self, general: &str, work: &PoseWork<'_>, observer: &mut dyn Observer) -> Result<(), JobError> {
+        let (enough, beside) = (ENOUGH * work.photos.len() as f64, work.sparse.with_extension("second"));
+        let mut failed = None;
+        for (command, with_glomap) in self.ways(general, work) {
+            super::remove(&beside)?;
+            export::make_folder(&beside)?;
+            match process::run(&self.mapping(command, with_glomap, work, &beside), work.photos.len(), observer) {
+                Err(e) if e.is_cancelled() => return Err(e),
+                Err(e) => failed = failed.or(Some(e)),
+                Ok(()) if registered(&beside) > registered(&work.sparse) => {
+                    super::remove(&work.sparse)?;
+                    std::fs::rename(&beside, &work.sparse)
+                        .map_err(|e| crate::io::error::write_error(&work.sparse, e))?;
+                }
+                Ok(()) => {}
+            }
+            if registered(&work.sparse) as f64 >= enough {
+                break;
+            }
         }
-        let second = work.sparse.with_extension("second");
-        super::remove(&second)?;
-        export::make_folder(&second)?;
-        let other = process::run(&self.mapping("mapper", false, work, &second), work.photos.len(), observer);
-        if other.is_ok() && registered(&second) > registered(&work.sparse) {
-            super::remove(&work.sparse)?;
-            std::fs::rename(&second, &work.sparse).map_err(|e| crate::io::error::write_error(&work.sparse, e))?;
-        }
-        super::remove(&second)?;
-        if registered(&work.sparse) > 0 { Ok(()) } else { first.and(other) }
+        super::remove(&beside)?;
+        failed.filter(|_| registered(&work.sparse) == 0).map_or(Ok(()), Err)
     }
 }
 
@@ -156,4 +162,24 @@ fn text(path: &Path) -> String {
 fn args(command: &str, pairs: &[(&str, String)]) -> Vec<String> {
     let options = pairs.iter().flat_map(|(name, value)| [format!("--{name}"), value.clone()]);
     std::iter::once(command.to_owned()).chain(options).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn many_photos_are_mapped_globally_first() {
+        let ways = |photos: usize, general: &str, glomap: Option<&str>| {
+            let tools = Colmap { colmap: "colmap".into(), glomap: glomap.map(Into::into) };
+            let (names, sparse) = (vec![String::new(); photos], PathBuf::new());
+            let work = PoseWork { out: Path::new(""), photos: &names, one_camera: false, is_video: false, sparse };
+            tools.ways(general, &work)
+        };
+        let [one_by_one, globally, glomap] = [("mapper", false), ("global_mapper", false), ("mapper", true)];
+        assert_eq!(ways(150, "global_mapper", None), [one_by_one, globally]);
+        assert_eq!(ways(151, "global_mapper", Some("glomap")), [globally, one_by_one]);
+        assert_eq!(ways(151, "", Some("glomap")), [glomap, one_by_one]);
+        assert_eq!(ways(151, "", None), [one_by_one]);
+    }
 }

@@ -9,7 +9,7 @@ use crate::jobs::JobError;
 use crate::math::rotation::{nearest_rotation, rotation_error};
 use crate::math::stats::{mean, median, worst};
 use crate::navigate::pose;
-use crate::scene::{Camera, Dataset, Photo};
+use crate::scene::{Camera, Dataset, Photo, rig};
 
 /// Fewest photos that can be aligned.
 const FEWEST: usize = 3;
@@ -47,7 +47,10 @@ pub(crate) fn compare(found: &Dataset, given: &Dataset) -> Result<PoseComparison
         return Err(too_few());
     }
     let centers: Vec<[DVec3; 2]> = pairs.iter().map(|(f, g)| [f.center, g.center]).collect();
-    let fit = Similarity::fit(&centers).ok_or_else(too_few)?;
+    // A pose far from all others is wrong; it counts, but would turn and shrink the others.
+    let stray = rig::strays(&centers.iter().map(|[found, _]| *found).collect::<Vec<_>>());
+    let usual: Vec<_> = centers.iter().zip(&stray).filter(|(_, stray)| !**stray).map(|(pair, _)| *pair).collect();
+    let fit = Similarity::fit(&usual).ok_or_else(too_few)?;
     let (_, radius) = Camera::extent_of(pairs.iter().map(|(_, g)| *g));
     let distances: Vec<f64> = centers.iter().map(|[f, g]| fit.apply(*f).distance(*g) / radius).collect();
     let angle =
@@ -165,6 +168,15 @@ mod tests {
             let noisy = compare(&dataset(turn, 0.3, DVec3::ZERO, 0.1, planar), &given).expect("compared");
             assert!((0.003..0.1).contains(&noisy.center[0]), "{planar}: {noisy:?}");
         }
+    }
+
+    #[test]
+    fn a_stray_counts_and_spoils_no_other() {
+        let given = dataset(DMat3::IDENTITY, 1.0, DVec3::ZERO, 0.0, false);
+        let mut found = given.clone();
+        found.photos[3].camera.center *= 200.0;
+        let off = compare(&found, &given).expect("compared");
+        assert!(off.center[0] < 1e-9 && off.center[1] > 10.0 && off.photos == 12, "{off:?}");
     }
 
     #[test]

@@ -91,6 +91,14 @@ impl PoseWork<'_> {
         const ALL_PAIRS: usize = 150;
         self.is_video && self.photos.len() > ALL_PAIRS
     }
+
+    /// True if all photos are placed at once, not one by one. This is faster, but may place photos on a handful of
+    /// points and bend all with them: by half the scene's radius, in a video of 50 frames.
+    fn maps_globally(&self) -> bool {
+        /// Photos up to which the slower way takes minutes.
+        const ONE_BY_ONE: usize = 150;
+        self.photos.len() > ONE_BY_ONE
+    }
 }
 
 /// Finds the poses of photos with this maker, in `out`, which `is_own` if the program chose it. Steps that an earlier call finished there are not done again.

@@ -3,7 +3,7 @@
 import os
 import sys
 
-step, out, sparse, one_camera, sequential, enough = sys.argv[1:7]
+step, out, sparse, one_camera, sequential, enough, globally = sys.argv[1:8]
 import pycolmap
 
 database = os.path.join(out, "database.db")
@@ -26,9 +26,7 @@ elif step == "matches":
     pycolmap.match_exhaustive(database)
 elif step == "mapping":
     found = 0
-    # Global mapping may place photos on a handful of points, and bend all with them; it is for many photos.
-    many = len(os.listdir(images)) > 150
-    if many and hasattr(pycolmap, "global_mapping"):
+    if globally == "1" and hasattr(pycolmap, "global_mapping"):
         try:
             found = registered(pycolmap.global_mapping(database, images, sparse))
         except Exception as error:

@@ -63,6 +63,7 @@ impl PoseMaker for Pycolmap {
             flag(work.one_camera),
             flag(work.is_sequential()),
             enough.to_string(),
+            flag(work.maps_globally()),
         ];
         let stage = PoseStage { title: step.title(), program: self.python.clone(), args };
         process::run(&stage, work.photos.len(), observer)

@@ -208,26 +208,24 @@ fn somebodys_own_colmap_project_is_no_place_for_poses() {
 }
 
 #[test]
-fn a_new_colmap_maps_globally_and_again_where_few_photos_get_a_pose() {
+fn few_photos_are_mapped_one_by_one_and_globally_where_few_of_them_get_a_pose() {
     let fake = Fake::new("true");
     let program = fake.guard.path().join("colmap");
     let script = fs::read_to_string(&program).expect("read");
     let new = script.replace("COLMAP 3.8 (without CUDA)", "COLMAP 4.1 (with CUDA) global_mapper mapper");
-    // Its global mapper finds one photo of three.
-    let few = new.replace("mapper)\n", "global_mapper) mkdir -p \"$7/0\" ;;\nmapper)\n");
+    // Its incremental mapper finds no photo of three.
+    let few = new.replace("mapper)\n", "mapper) mkdir -p \"$7/0\" ;;\nglobal_mapper)\n");
     fs::write(&program, few).expect("written");
     fake.find(&mut Silent).expect("found");
     let asked = fake.asked();
     let [global, mapper] = ["\nglobal_mapper --database_path", "\nmapper --database_path"].map(|w| asked.find(w));
-    assert!(global.is_some() && global < mapper, "{asked}");
+    assert!(mapper.is_some() && mapper < global, "{asked}");
     assert!(!asked.contains("use_gpu"), "a GPU is used as it is");
     // The control: enough photos at once.
     let fake = Fake::new("true");
-    let new = fs::read_to_string(fake.guard.path().join("colmap")).expect("read");
-    let new = new.replace("COLMAP 3.8 (without CUDA)", "global_mapper").replace("mapper)\n", "global_mapper)\n");
-    fs::write(fake.guard.path().join("colmap"), new).expect("written");
+    fs::write(fake.guard.path().join("colmap"), new.replace("mapper)\n", "mapper | global_mapper)\n")).expect("written");
     fake.find(&mut Silent).expect("found");
-    assert!(!fake.asked().contains("\nmapper"), "{}", fake.asked());
+    assert!(!fake.asked().contains("global_mapper"), "{}", fake.asked());
 }
 
 #[test]
