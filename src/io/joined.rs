@@ -4,7 +4,7 @@
 //! the paths in it may lead anywhere; only pictures and a data set are read from there. Added photos have their cameras in
 //! it, in the frame of the data set.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
@@ -28,6 +28,9 @@ pub(crate) struct JoinedPhotos {
     /// Names of its photos that are held out.
     pub(crate) held_out: BTreeSet<String>,
     pub(crate) added: Vec<AddedPhoto>,
+    /// Cameras of photos of the data set at poses that training refined, by name.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub(crate) refined: BTreeMap<String, Camera>,
     /// Request that made the list, to resume it.
     #[serde(default)]
     pub(crate) request: serde_json::Value,
@@ -73,10 +76,10 @@ pub(crate) fn list(folder: &Path) -> Result<JoinedPhotos, IoError> {
     if list.version != VERSION {
         return Err(IoError::Version { path, found: list.version, supported: VERSION });
     }
-    for added in &list.added {
-        files::photo_name(&added.name, &path)?;
-        let photo = || added.name.clone();
-        added.camera.believe().map_err(|cause| IoError::Camera { path: path.clone(), photo: photo(), cause })?;
+    let added = list.added.iter().map(|added| (&added.name, &added.camera));
+    for (name, camera) in added.chain(&list.refined) {
+        files::photo_name(name, &path)?;
+        camera.believe().map_err(|cause| IoError::Camera { path: path.clone(), photo: name.clone(), cause })?;
     }
     Ok(list)
 }
@@ -109,6 +112,9 @@ pub(super) fn read(folder: &Path) -> Result<Dataset, IoError> {
     pixel_masks::find(&mut dataset);
     for photo in &mut dataset.photos {
         photo.test_split = list.held_out.contains(&photo.name);
+        if let Some(refined) = list.refined.get(&photo.name) {
+            photo.camera.set_pose(refined);
+        }
     }
     let taken: BTreeSet<String> = dataset.photos.iter().map(|p| p.name.clone()).collect();
     let mut gone = 0;
@@ -172,6 +178,7 @@ mod tests {
             photos: at("far"),
             held_out: ["b.png".to_owned()].into(),
             added: vec![added.clone(), gone],
+            refined: [("b.png".to_owned(), camera(1.1))].into(),
             ..JoinedPhotos::default()
         };
         write(&at("scene"), &joined).expect("written");
@@ -179,6 +186,8 @@ mod tests {
         let names: Vec<(&str, bool)> = read.photos.iter().map(|p| (p.name.as_str(), p.test_split)).collect();
         assert_eq!(names, [("a.png", false), ("b.png", true), ("added/a.png", false)]);
         assert_eq!((read.name.as_str(), read.photos[2].camera.center), ("both", added.camera.center));
+        let places = [0, 1].map(|i| read.photos[i].camera.center);
+        assert!(places[0].distance(camera(0.0).center) < 1e-9 && places[1].distance(camera(1.1).center) < 1e-9);
         assert!(read.warnings.iter().any(|w| w.starts_with("1 of 2 photos that were added")), "{:?}", read.warnings);
         assert_eq!(files::real(&read.photos[2].path), files::real(&at("near/a.png")));
         let text = std::fs::read_to_string(at("scene").join(JOINED_FILE)).expect("read");

@@ -9,8 +9,7 @@ pub(crate) fn at_refined_poses(photos: &mut [Photo], info: &SceneInfo) {
         let own = info.cameras.iter().find(|c| c.name == fit.name);
         let photo = photos.iter_mut().find(|p| p.name == fit.name);
         if let (Some(own), Some(photo)) = (own, photo) {
-            let (axes, center) = (own.camera.world_from_camera, own.camera.center);
-            (photo.camera.world_from_camera, photo.camera.center) = (axes, center);
+            photo.camera.set_pose(&own.camera);
         }
     }
 }

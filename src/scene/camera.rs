@@ -233,6 +233,11 @@ impl Camera {
         self.resized(side(self.width_px), side(self.height_px))
     }
 
+    /// Takes the place and rotation of another camera.
+    pub(crate) fn set_pose(&mut self, other: &Self) {
+        (self.world_from_camera, self.center) = (other.world_from_camera, other.center);
+    }
+
     /// Unit vector of the viewing direction in the world.
     pub(crate) fn forward(&self) -> DVec3 {
         self.world_from_camera.z_axis

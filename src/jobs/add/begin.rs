@@ -47,18 +47,25 @@ pub(super) fn settings(scene: &Scene, dataset: &Dataset, added: usize, steps: Op
     let from = scene.history.steps.last().map_or(scene.config.steps, |s| s.step).max(1);
     let usual = (STEPS_PER_PHOTO * added as u64).min(from / MOST_OF_ALL).max(FEWEST_STEPS);
     let holdout_every = if dataset.test_photos() > 0 { scene.config.holdout_every } else { 0 };
-    let config =
-        TrainConfig { steps: from + steps.unwrap_or(usual), coarse_share: 0.0, holdout_every, ..scene.config.clone() };
+    let config = TrainConfig {
+        steps: from + steps.unwrap_or(usual),
+        coarse_share: 0.0,
+        holdout_every,
+        // Gains of all photos are measured before.
+        exposure: false,
+        ..scene.config.clone()
+    };
     (config, from)
 }
 
-/// Compares the photos and writes the checkpoint from which the refinement starts. `added` names the added photos.
+/// Compares the photos and writes the checkpoint from which the refinement starts. `added` names the added photos, and
+/// `located` those of them whose poses were found in the scene.
 pub(super) fn begin(
     out: &SceneFolder,
     (scene, trained): (&Scene, TrainedScene),
     dataset: &Dataset,
     (config, from_step): (&TrainConfig, u64),
-    added: &BTreeSet<String>,
+    [added, located]: [&BTreeSet<String>; 2],
     observer: &mut dyn Observer,
 ) -> Result<(), JobError> {
     let dataset = &*dataset.with_alpha(config.alpha);
@@ -83,7 +90,12 @@ pub(super) fn begin(
             continue;
         }
         corrected.push(active::corrected(view, fit.gain));
-        photos.push(RefiningPhoto { name: view.name.clone(), turns: 1, gain: fit.gain });
+        photos.push(RefiningPhoto {
+            name: view.name.clone(),
+            turns: 1,
+            gain: fit.gain,
+            located: located.contains(&view.name),
+        });
     }
     if photos.is_empty() {
         let text = "none of the added photos looks like the scene at its pose; were they posed in another frame? Add the \
@@ -103,7 +115,12 @@ pub(super) fn begin(
     let beside = beside(&shares, photos.len());
     let turns = beside.len().div_ceil(OLD_STEPS * photos.len()).clamp(1, MOST_TURNS) as u32;
     photos.iter_mut().for_each(|p| p.turns = turns);
-    photos.extend(beside.iter().map(|&i| RefiningPhoto { name: old[i].name.clone(), turns: 1, gain: [1.0; 3] }));
+    for view in beside.iter().map(|&i| &old[i]) {
+        // Where exposures were learned, these photos have one, too.
+        let gain =
+            if scene.config.exposure { active::fit(&mut renderer, &cloud, view, &settings)?.gain } else { [1.0; 3] };
+        photos.push(RefiningPhoto { name: view.name.clone(), turns: 1, gain, located: false });
+    }
     let most = most_gaussians(&active, cloud.len(), before.pixels());
     let text = format!(
         "{} of {} Gaussians are refined, by {} and {} that show them; the others stay",

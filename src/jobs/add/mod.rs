@@ -19,6 +19,7 @@ use serde_json::json;
 pub(crate) use self::begin::RefinedShare;
 pub(crate) use self::finish::HeldOutScores;
 pub(crate) use self::gather::RefusedPhoto;
+use super::refined::at_refined_poses;
 use super::train::{IfChanged, TrainStart, Trained};
 use super::{JobError, Scene, derived, open, train};
 use crate::io::joined::{self, AddedPhoto, JoinedPhotos};
@@ -91,7 +92,9 @@ pub(crate) fn run(
     let photos = out.join(PHOTOS);
     let mut refused = Vec::new();
     if !is_begun(&request, out) {
-        let own = open::dataset(&scene.photos(options.dataset.as_deref())?)?;
+        let given = open::dataset(&scene.photos(options.dataset.as_deref())?)?;
+        let mut own = given.clone();
+        at_refined_poses(&mut own.photos, &trained::load_info(folder)?);
         let found = gather::gather(scene, &own, paths, options.focal_px, observer)?;
         for photo in &found.refused {
             observer.note(Severity::Warning, format!("{} is not added: {}", photo.photo.display(), photo.reason));
@@ -104,19 +107,22 @@ pub(crate) fn run(
         refused = found.refused;
         let masks = options.masks.clone().or_else(|| finish::masks_among(&found.roots, &found.added));
         let request = with_masks(request.clone(), masks.as_deref());
-        keep(scene, &own, found.added, request, &photos)?;
+        keep(scene, [&given, &own], found.added, request, &photos)?;
     }
     let list = joined::list(&photos)?;
     let dataset = open::dataset(&photos)?;
     let new = || list.added.iter().skip(earlier(&list));
-    let added: BTreeSet<String> = new().map(|p| p.name.clone()).collect();
+    let names = |wanted: fn(&&AddedPhoto) -> bool| new().filter(wanted).map(|p| p.name.clone()).collect();
+    let (added, located): (BTreeSet<String>, BTreeSet<String>) = (names(|_| true), names(|p| p.located));
     let trained_on = new().filter(|p| !p.held_out).count();
     let (mut config, from) = begin::settings(scene, &dataset, trained_on.max(1), options.steps);
     config.backend = options.backend.unwrap_or(config.backend);
+    // Their places come from this scene alone; now both are fitted. Other photos keep theirs.
+    config.refine_poses = !located.is_empty() && config.backend != BackendChoice::Gpu;
     if !out.join(CHECKPOINT_FILE).is_file() {
         let held = SceneFolder::hold(out, "adding photos")?;
         let before = trained::load(folder)?;
-        let begun = begin::begin(&held, (scene, before), &dataset, (&config, from), &added, observer);
+        let begun = begin::begin(&held, (scene, before), &dataset, (&config, from), [&added, &located], observer);
         begun.inspect_err(|e| forget(e, out))?;
     }
     let objects_of = TrainStart { objects_of: Some(folder.into()), if_changed: IfChanged::Ask, more_steps: false };
@@ -188,21 +194,28 @@ fn forget(error: &JobError, out: &Path) {
     }
 }
 
-/// Writes the list of all photos: the scene's own, those that were added before, and those that are new.
+/// Writes the list of all photos: the scene's own, as given and at the poses that its training refined, those that were
+/// added before, and those that are new.
 fn keep(
     scene: &Scene,
-    own: &Dataset,
+    [given, own]: [&Dataset; 2],
     added: Vec<AddedPhoto>,
     mut request: serde_json::Value,
     folder: &Path,
 ) -> Result<(), JobError> {
     let earlier = joined::list(&own.root).ok();
     let held = super::held_out::held_out(own, &scene.cameras, None, scene.config.holdout_every);
-    let before = earlier.map_or_else(Vec::new, |list| list.added);
+    let (before, mut refined) = earlier.map_or_else(Default::default, |list| (list.added, list.refined));
+    let camera = |name: &str| own.photos.iter().find(|p| p.name == name).map(|p| p.camera.clone());
     let moved = |p: AddedPhoto| {
         let photo = p.photo(&own.root);
-        AddedPhoto { path: photo.path, mask: photo.mask, ..p }
+        let camera = camera(&p.name).unwrap_or_else(|| p.camera.clone());
+        AddedPhoto { path: photo.path, mask: photo.mask, camera, ..p }
     };
+    let is_earlier = |name: &str| before.iter().any(|p| p.name == name);
+    let pairs = given.photos.iter().zip(&own.photos);
+    let moved_since = pairs.filter(|(given, own)| given.camera != own.camera && !is_earlier(&own.name));
+    refined.extend(moved_since.map(|(_, own)| (own.name.clone(), own.camera.clone())));
     if let Some(all) = request.as_object_mut() {
         all.insert("earlier".into(), json!(before.len()));
     }
@@ -211,7 +224,8 @@ fn keep(
         name: derived::name(&scene.name, "closer", folder.parent().unwrap_or(folder)),
         photos: files::real(&base),
         held_out: held.iter().map(|&i| own.photos[i].name.clone()).collect(),
-        added: before.into_iter().map(moved).chain(added).collect(),
+        refined,
+        added: before.iter().cloned().map(moved).chain(added).collect(),
         request,
         ..JoinedPhotos::default()
     };

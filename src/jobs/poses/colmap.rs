@@ -85,7 +85,8 @@ impl Colmap {
     /// Ways to map, the better one for these photos first.
     fn ways(&self, general: &str, work: &PoseWork<'_>) -> Vec<(&'static str, bool)> {
         let has_global = general.split_whitespace().any(|word| word == "global_mapper");
-        let global = if has_global { Some(("global_mapper", false)) } else { self.glomap.as_ref().map(|_| ("mapper", true)) };
+        let global =
+            if has_global { Some(("global_mapper", false)) } else { self.glomap.as_ref().map(|_| ("mapper", true)) };
         let mut ways: Vec<_> = std::iter::once(("mapper", false)).chain(global).collect();
         if work.maps_globally() {
             ways.reverse();

@@ -223,7 +223,8 @@ fn few_photos_are_mapped_one_by_one_and_globally_where_few_of_them_get_a_pose() 
     assert!(!asked.contains("use_gpu"), "a GPU is used as it is");
     // The control: enough photos at once.
     let fake = Fake::new("true");
-    fs::write(fake.guard.path().join("colmap"), new.replace("mapper)\n", "mapper | global_mapper)\n")).expect("written");
+    fs::write(fake.guard.path().join("colmap"), new.replace("mapper)\n", "mapper | global_mapper)\n"))
+        .expect("written");
     fake.find(&mut Silent).expect("found");
     assert!(!fake.asked().contains("global_mapper"), "{}", fake.asked());
 }

@@ -132,7 +132,7 @@ mod tests {
     fn drift_is_told_and_only_far_photos_are_named() {
         let views = views();
         let config = TrainConfig { refine_poses: true, exposure: true, ..TrainConfig::default() };
-        let mut fits = PhotoFits::new(&config, &views, &[true; 6], 2.0);
+        let mut fits = PhotoFits::new(&config, &views, &[true; 6], (0, 2.0));
         let told = |fits: &PhotoFits| of_poses(fits.poses.as_ref().expect("on"), &views);
         assert_eq!(told(&fits).1, None);
         let offset = |along: f64| PoseOffset { along: DVec3::X * along, turn: DVec3::Y * 0.001 };

@@ -48,12 +48,13 @@ pub(crate) struct PhotoFits {
 }
 
 impl PhotoFits {
-    /// Returns what a run in a scene of this radius learns of its photos, of those that are `free`; the others keep what they
-    /// have.
-    pub(crate) fn new(config: &TrainConfig, views: &[TrainView], free: &[bool], extent: f64) -> Self {
+    /// Returns what a run from step `from` on learns of its photos in a scene of this radius, of those that are `free`; the
+    /// others keep what they have.
+    pub(crate) fn new(config: &TrainConfig, views: &[TrainView], free: &[bool], (from, extent): (u64, f64)) -> Self {
         let given = || views.iter().map(|v| v.camera.clone()).collect();
+        let steps = from..config.steps;
         Self {
-            poses: config.refine_poses.then(|| PoseRefiner::new(given(), free.to_vec(), extent, config.steps)),
+            poses: config.refine_poses.then(|| PoseRefiner::new(given(), free.to_vec(), extent, steps)),
             exposures: config.exposure.then(|| ExposureFit::new(free.to_vec())),
             weights: Default::default(),
         }

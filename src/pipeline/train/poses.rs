@@ -9,6 +9,8 @@
 //! off by. What no photo can tell, a move, turn and change of size of everything, is taken out after each step
 //! ([`PoseGauge`]), unless some poses are held, which then hold the others.
 
+use std::ops::Range;
+
 use super::pose_gauge::PoseGauge;
 use super::pose_offset::{MOVE_DEVIATION, PoseOffset, TURN_DEVIATION};
 use crate::math::cholesky::solve;
@@ -47,20 +49,22 @@ pub(crate) struct PoseRefiner {
     gauge: Option<PoseGauge>,
     /// Radius of the scene, scene units.
     pub(super) extent: f64,
-    steps: u64,
+    steps: Range<u64>,
 }
 
 impl PoseRefiner {
-    /// Poses of a run of so many `steps`, of which those that are `free` move.
-    pub(crate) fn new(given: Vec<Camera>, free: Vec<bool>, extent: f64, steps: u64) -> Self {
+    /// Poses of a run of these `steps`, of which those that are `free` move.
+    pub(crate) fn new(given: Vec<Camera>, free: Vec<bool>, extent: f64, steps: Range<u64>) -> Self {
         let gauge = free.iter().all(|f| *f).then(|| PoseGauge::new(&given, extent)).flatten();
         Self { offsets: vec![PoseOffset::default(); given.len()], given, free, gauge, extent, steps }
     }
 
-    /// Steps between which poses move.
+    /// Steps between which poses move. A run that goes on from another has a scene from the begin.
     fn span(&self) -> [u64; 2] {
-        let of = |share: f64| (share * self.steps as f64).round() as u64;
-        [of(BEGIN).clamp(BEGIN_STEPS[0], BEGIN_STEPS[1]), of(END)]
+        let Range { start, end } = self.steps;
+        let of = |share: f64| (share * end.saturating_sub(start) as f64).round() as u64;
+        let wait = if start > 0 { 0 } else { of(BEGIN).clamp(BEGIN_STEPS[0], BEGIN_STEPS[1]) };
+        [start + wait, start + of(END)]
     }
 
     /// Returns whether photo `i` moves at `step`.
@@ -138,7 +142,7 @@ mod tests {
 
     fn refiner(free: bool) -> PoseRefiner {
         let cameras: Vec<Camera> = (0..5).map(camera).collect();
-        PoseRefiner::new(cameras, vec![free, true, true, true, true], 3.0, 1_000)
+        PoseRefiner::new(cameras, vec![free, true, true, true, true], 3.0, 0..1_000)
     }
 
     #[test]
@@ -226,6 +230,9 @@ mod tests {
         assert!(!refiner.moves(0, 500) && refiner.moves(1, 500));
         assert!(!refiner.moves(1, 99) && refiner.moves(1, 100) && refiner.moves(1, 899) && !refiner.moves(1, 900));
         assert!(refiner.share(100) > 9.0 * refiner.share(900));
+        let later = PoseRefiner::new(vec![camera(0)], vec![true], 3.0, 5_000..5_400);
+        assert!(!later.moves(0, 4_999) && later.moves(0, 5_000) && later.moves(0, 5_359) && !later.moves(0, 5_360));
+        assert!(later.share(5_000) > 9.0 * later.share(5_360));
     }
 
     #[test]

@@ -31,6 +31,9 @@ pub struct RefiningPhoto {
     pub(crate) turns: u32,
     /// Gain of its colors against the scene's, by channel.
     pub(crate) gain: [f32; 3],
+    /// True if its pose was found in the scene, and is refined.
+    #[serde(default)]
+    pub(crate) located: bool,
 }
 
 /// Returns the photos of a round, by index: each as often as it has turns, or once if `turns` is empty.
@@ -44,6 +47,12 @@ pub(super) fn those_of(refinement: Option<&Refinement>, dataset: &Dataset, train
     let Some(refinement) = refinement else { return train };
     let is_used = |i: &usize| refinement.photos.iter().any(|p| p.name == dataset.photos[*i].name);
     train.into_iter().filter(is_used).collect()
+}
+
+/// Returns which poses and exposures of a run are free: in a refinement those of located photos.
+pub(super) fn free(refinement: Option<&Refinement>, views: &[TrainView]) -> Vec<bool> {
+    let is_free = |v: &TrainView, r: &Refinement| r.photos.iter().any(|p| p.located && p.name == v.name);
+    views.iter().map(|v| refinement.is_none_or(|r| is_free(v, r))).collect()
 }
 
 /// Divides the gains out of the photos of a refinement.

@@ -142,7 +142,11 @@ impl<'a> Job<'a> {
         let (extent, background) = (dataset.camera_extent().1, dataset.background.unwrap_or([0.0; 3]));
         let mut rng = Pcg64Mcg::seed_from_u64(config.seed);
         let (mut secs, mut history, mut unreported) = (0.0, History::default(), StepWindow::default());
-        let mut fits = PhotoFits::new(config, &views, &vec![true; views.len()], extent);
+        let mut fits = {
+            let refinement = saved.as_ref().and_then(|s| s.header.refinement.as_ref());
+            let from = refinement.map_or(0, |r| r.from_step);
+            PhotoFits::new(config, &views, &refine::free(refinement, &views), (from, extent))
+        };
         fits.restore(saved.as_ref().map_or(&[], |s| &s.header.fits), &views);
         // More steps mean more coarse steps; a run that already trained at full size does not go back.
         let was_coarse = saved.as_ref().is_none_or(|s| s.header.step < coarse::steps(&s.header.config));

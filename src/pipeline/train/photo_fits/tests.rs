@@ -81,7 +81,7 @@ fn trainer(config: &TrainConfig, views: &[TrainView], free: bool) -> Trainer {
     cloud.positions.as_flattened_mut().iter_mut().for_each(|p| *p += rng.random_range(-0.05..0.05));
     cloud.sh.fill([0.0; 3]);
     let mut trainer = Trainer::new(cloud, config, [0.0; 3], EXTENT, rng);
-    trainer.fits = PhotoFits::new(config, views, &vec![free; views.len()], EXTENT);
+    trainer.fits = PhotoFits::new(config, views, &vec![free; views.len()], (0, EXTENT));
     trainer
 }
 
@@ -180,7 +180,7 @@ fn what_a_checkpoint_keeps_goes_on_bit_for_bit() {
         let mut t = Trainer::new(straight.cloud.clone(), &config, [0.0; 3], EXTENT, straight.rng.clone());
         (t.moments, t.stats, t.step, t.round) =
             (straight.moments.clone(), straight.stats.clone(), straight.step, straight.round.clone());
-        t.fits = PhotoFits::new(&config, &views, &[true; PHOTOS], EXTENT);
+        t.fits = PhotoFits::new(&config, &views, &[true; PHOTOS], (0, EXTENT));
         t.fits.restore(stored, &views);
         t
     };
