@@ -31,7 +31,7 @@ const MOST_TURNS: usize = 8;
 const MOST_PER_PIXEL: f64 = 0.5;
 const LEAST_GROWTH: f64 = 0.25;
 /// Steps on old photos for each on an added one: the old photos are many, and must not get worse.
-const OLD_STEPS: usize = 2;
+const OLD_STEPS: usize = 4;
 
 /// Number of Gaussians that are refined, for the report.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
