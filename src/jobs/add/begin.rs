@@ -18,7 +18,7 @@ use crate::scene::Dataset;
 /// Steps for each added photo, share of the steps of the whole training that a refinement takes at most, and its least
 /// number of steps.
 const STEPS_PER_PHOTO: u64 = 150;
-const MOST_OF_ALL: u64 = 6;
+const MOST_OF_ALL: u64 = 10;
 const FEWEST_STEPS: u64 = 300;
 /// Share of an old photo from which active Gaussians in it are trained on.
 const LEAST_SHARE: f64 = 0.002;
