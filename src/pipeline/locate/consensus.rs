@@ -4,6 +4,7 @@
 use glam::{DVec2, DVec3};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
+use rayon::prelude::*;
 
 use super::p3p;
 use super::pose::{PARAMETERS, flow, moved};
@@ -47,10 +48,13 @@ pub(super) fn consensus(
     if matches.len() < FEWEST {
         return None;
     }
-    let mut best: Option<(f64, Camera)> = None;
-    for focal in focals {
+    let with = |focal: &f64| {
         let lens = Camera { focal_px: template.focal_px * *focal, ..template.clone() };
-        let Some((cost, camera)) = sampled(matches, &lens, within_px) else { continue };
+        sampled(matches, &lens, within_px)
+    };
+    let sampled: Vec<Option<(f64, Camera)>> = focals.par_iter().map(with).collect();
+    let mut best: Option<(f64, Camera)> = None;
+    for (cost, camera) in sampled.into_iter().flatten() {
         if best.as_ref().is_none_or(|(least, _)| cost < *least) {
             best = Some((cost, camera));
         }

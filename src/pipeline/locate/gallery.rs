@@ -8,6 +8,7 @@ use glam::{DQuat, DVec2};
 use super::descriptor::features;
 use super::gray::GrayPlane;
 use super::matching::WorldFeature;
+use super::sharpness::samples_across;
 use super::signature::{Placed, ViewSignature};
 use crate::math::stats::median;
 use crate::pipeline::locate::LocateError;
@@ -24,6 +25,9 @@ pub(super) const MOST_FEATURES: usize = 500;
 /// Shares of the distance from a view to the scene at which a photo may have been taken, and weights of the likeness:
 /// the smaller a photo is made, the more places it is like by chance.
 const DISTANCES: [(f64, f32); 2] = [(1.0, 1.0), (0.5, 0.85)];
+/// Size of finer views by that of the photos, and their longer side at most, px.
+const FINER: u32 = 3;
+const FINER_PX: u32 = 800;
 /// Views at most; of more cameras, some evenly spaced.
 const MOST_VIEWS: usize = 256;
 
@@ -41,8 +45,26 @@ struct GalleryView {
     signature: ViewSignature,
     /// Usual depth of what it sees, scene units.
     depth: f64,
-    /// Features with places in the world; made when they are first needed.
-    features: Option<Arc<Vec<WorldFeature>>>,
+    /// Features with places in the world at each fineness; made when they are first needed.
+    features: [Option<Arc<Vec<WorldFeature>>>; 2],
+}
+
+/// Size of the views whose features are matched.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum ViewFineness {
+    /// That of the cameras' photos.
+    Own,
+    /// Larger, so that what fills a close-up is large enough to have features.
+    Finer,
+}
+
+impl ViewFineness {
+    fn of(self, camera: &Camera) -> Camera {
+        match self {
+            Self::Own => camera.limited_to(FEATURES_PX),
+            Self::Finer => camera.resized(FINER * camera.width_px, FINER * camera.height_px).limited_to(FINER_PX),
+        }
+    }
 }
 
 /// A view that looks like a photo.
@@ -75,7 +97,7 @@ impl Gallery {
             let signature = ViewSignature::of(&GrayPlane::of_planes(&frame.color, frame.width_px));
             let depths: Vec<f64> = frame.median_depth.iter().filter(|d| **d > 0.0).map(|d| f64::from(*d)).collect();
             let depth = if depths.is_empty() { 0.0 } else { median(&depths) };
-            gallery.views.push(GalleryView { camera: camera.clone(), signature, depth, features: None });
+            gallery.views.push(GalleryView { camera: camera.clone(), signature, depth, features: [None, None] });
             ticker.tick(done + 1, observer)?;
         }
         Ok(gallery)
@@ -122,14 +144,24 @@ impl Gallery {
     }
 
     /// The features of a view.
-    pub(super) fn features(&mut self, view: usize) -> Result<Arc<Vec<WorldFeature>>, LocateError> {
-        if let Some(known) = &self.views[view].features {
+    pub(super) fn features(
+        &mut self,
+        view: usize,
+        fineness: ViewFineness,
+    ) -> Result<Arc<Vec<WorldFeature>>, LocateError> {
+        if let Some(known) = &self.views[view].features[fineness as usize] {
             return Ok(Arc::clone(known));
         }
-        let camera = self.views[view].camera.limited_to(FEATURES_PX);
+        let camera = fineness.of(&self.views[view].camera);
         let found = Arc::new(self.features_from(&camera)?);
-        self.views[view].features = Some(Arc::clone(&found));
+        self.views[view].features[fineness as usize] = Some(Arc::clone(&found));
         Ok(found)
+    }
+
+    /// Samples along the longer side of a picture that the training photos had of what it shows.
+    pub(super) fn samples_across(&self, camera: &Camera, frame: &Frame<f32>) -> Option<f64> {
+        let views: Vec<&Camera> = self.views.iter().map(|v| &v.camera).collect();
+        samples_across(camera, &frame.median_depth, &views)
     }
 
     /// The features that a camera sees, where the scene has a depth.

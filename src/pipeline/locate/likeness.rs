@@ -5,8 +5,11 @@ use super::gray::GrayPlane;
 
 /// Side of a block, px.
 const BLOCK_PX: usize = 8;
-/// Longer side of the compared pictures, px.
-const COMPARED_PX: usize = 200;
+/// Longer side of the compared pictures at most, px, and of those of which the training photos had few samples.
+pub(super) const COMPARED_PX: usize = 200;
+const LEAST_COMPARED_PX: usize = 64;
+/// Pixels of the compared pictures for a sample of the training photos: less detail than this needs is in the scene.
+const PX_PER_SAMPLE: f64 = 2.0;
 /// Standard deviation below which a block has no structure, in full scale: noise of cameras.
 const FLAT: f32 = 0.012;
 /// Correlation from which a block is explained: half of its variance is not by chance.
@@ -30,14 +33,19 @@ impl Likeness {
     }
 }
 
-/// Compares a rendering with a photo of its size; pixels of coverage 0 do not count.
-pub(super) fn likeness(rendered: &GrayPlane, photo: &GrayPlane, coverage: &[f32]) -> Likeness {
+/// Longer side at which a picture is compared of which the training photos had so many samples along it, px.
+pub(super) fn compared_px(samples: Option<f64>) -> usize {
+    samples.map_or(COMPARED_PX, |n| ((PX_PER_SAMPLE * n) as usize).clamp(LEAST_COMPARED_PX, COMPARED_PX))
+}
+
+/// Compares a rendering with a photo of its size, at most so large; pixels of coverage 0 do not count.
+pub(super) fn likeness(rendered: &GrayPlane, photo: &GrayPlane, coverage: &[f32], most_px: usize) -> Likeness {
     let longer = photo.width.max(photo.height);
-    if longer > COMPARED_PX {
-        let side = |s: usize| (s * COMPARED_PX / longer).max(1);
+    if longer > most_px {
+        let side = |s: usize| (s * most_px / longer).max(1);
         let (w, h) = (side(photo.width), side(photo.height));
         let covered = GrayPlane { values: coverage.to_vec(), ..*photo };
-        return likeness(&rendered.resized(w, h), &photo.resized(w, h), &covered.resized(w, h).values);
+        return likeness(&rendered.resized(w, h), &photo.resized(w, h), &covered.resized(w, h).values, most_px);
     }
     let (mut blocks, mut explained, mut sum) = (0_usize, 0_usize, 0.0);
     for top in (0..photo.height.saturating_sub(BLOCK_PX - 1)).step_by(BLOCK_PX) {
@@ -88,12 +96,31 @@ mod tests {
         let rendered = plane(|x, y| wave(x, y, 1.0));
         let covered = vec![1.0; 96 * 80];
         let photo = plane(|x, y| if x < 16 { 0.3 } else { 1.3 * wave(x, y, 1.0) - 0.1 });
-        let same = likeness(&rendered, &photo, &covered);
+        let same = likeness(&rendered, &photo, &covered, COMPARED_PX);
         assert!((same.explained - 10.0 / 12.0).abs() < 0.02 && same.correlation > 0.8, "{same:?}");
-        let other = likeness(&rendered, &plane(|x, y| wave(x, y, 1.37)), &covered);
+        let other = likeness(&rendered, &plane(|x, y| wave(x, y, 1.37)), &covered, COMPARED_PX);
         assert!(other.explained < 0.3 && other.correlation < 0.3, "{other:?}");
-        assert_eq!(likeness(&rendered, &photo, &vec![0.0; 96 * 80]), Likeness::default());
+        assert_eq!(likeness(&rendered, &photo, &vec![0.0; 96 * 80], COMPARED_PX), Likeness::default());
         let flat = plane(|_, _| 0.5);
-        assert_eq!(likeness(&flat, &flat, &covered), Likeness::default());
+        assert_eq!(likeness(&flat, &flat, &covered, COMPARED_PX), Likeness::default());
+    }
+    #[test]
+    fn detail_that_the_scene_cannot_show_does_not_count_where_its_samples_are_few() {
+        let size = 192 * 160;
+        let coarse = |i: usize| ((i % 192) as f32 * 0.21).sin() * ((i / 192) as f32 * 0.17).cos();
+        let fine = |i: usize| ((i % 192) as f32 * 2.1).sin() * ((i / 192) as f32 * 2.3).cos();
+        let of = |value: &dyn Fn(usize) -> f32| GrayPlane {
+            width: 192,
+            height: 160,
+            values: (0..size).map(value).collect(),
+        };
+        let blurred = of(&|i| 0.5 + 0.1 * coarse(i));
+        let photo = of(&|i| 0.5 + 0.1 * coarse(i) + 0.2 * fine(i));
+        let at = |samples: f64| likeness(&blurred, &photo, &vec![1.0; size], compared_px(Some(samples)));
+        assert!(at(900.0).explained < 0.5 && at(32.0).explained > 0.9, "{:?} {:?}", at(900.0), at(32.0));
+        let other = of(&|i| 0.5 + 0.1 * coarse(size - i) + 0.2 * fine(i));
+        let other = likeness(&blurred, &other, &vec![1.0; size], compared_px(Some(32.0)));
+        assert!(other.explained < 0.35, "{other:?}");
+        assert_eq!([compared_px(None), compared_px(Some(1e9)), compared_px(Some(1.0))], [200, 200, 64]);
     }
 }

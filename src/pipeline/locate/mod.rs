@@ -2,13 +2,15 @@
 //!
 //! 1. **Coarse** ([`gallery`], [`signature`]): small renderings of the training cameras are compared with the photo by
 //!    the directions of edges, in four quarter turns and several shifts.
-//! 2. **Middle** ([`descriptor`], [`matching`], [`mod@consensus`]): features of the photo are matched with those of the
-//!    most alike renderings, whose depth makes them points of the scene; then once more with a rendering from the pose
-//!    found. Three points give a pose ([`p3p`]), the one that most matches agree on is kept.
+//! 2. **Middle** ([`descriptor`], [`matching`], [`mod@consensus`], [`mod@matched`]): features of the photo are matched
+//!    with those of the most alike renderings, whose depth makes them points of the scene; then once more with a
+//!    rendering from the pose found. Three points give a pose ([`p3p`]), the one that most matches agree on is kept.
 //! 3. **Fine** ([`mod@align`], [`photometric`]): the colors are aligned, from small pictures to larger ones.
 //!
-//! [`mod@likeness`] then says how much of the photo the scene explains; a photo of something else is refused. A pose
-//! that is nearly right needs the third part alone ([`nearby`]).
+//! [`mod@likeness`] then says how much of the photo the scene explains; a photo of something else is refused. If this
+//! fails, the photo may be a close-up: the middle part is done again with finer renderings of more cameras, and photo and
+//! scene are compared at the size at which the scene is sharp ([`sharpness`]). A pose that is nearly right needs the third
+//! part alone ([`nearby`]).
 
 mod align;
 mod consensus;
@@ -17,26 +19,25 @@ mod descriptor;
 mod gallery;
 mod gray;
 mod likeness;
+mod matched;
 mod matching;
 mod nearby;
 mod p3p;
 mod photometric;
 mod pose;
+mod sharpness;
 mod signature;
 
 use std::sync::Arc;
 
-use glam::DVec2;
-
 use self::align::{Aligned, FocalBounds, STEPS, align};
 pub(super) use self::align::{Curvature, curvature};
 pub(super) use self::consensus::hold_focal;
-use self::consensus::{Consensus, PointMatch, consensus};
-use self::descriptor::{PictureFeature, features};
+use self::descriptor::features;
 use self::gallery::{AlikeView, FEATURES_PX, Gallery, MOST_FEATURES};
 use self::gray::GrayPlane;
-use self::likeness::{Likeness, likeness};
-use self::matching::pairs;
+use self::likeness::{COMPARED_PX, Likeness, compared_px, likeness};
+use self::matched::{CLOSE_UPS, MatchedPose, ORDINARY, SeenPhoto, matched};
 pub(crate) use self::nearby::PoseAligner;
 use self::photometric::{PhotoLevel, WIDTH};
 pub(super) use self::pose::{PARAMETERS, moved};
@@ -55,18 +56,6 @@ const LEVELS_PX: [u32; 2] = [96, 192];
 const FINEST_STEPS: usize = 6;
 /// Usual longer side of the finest pictures, px.
 pub(crate) const USUAL_PX: u32 = 400;
-/// Views whose features are matched at once, and such groups at most.
-const GROUP: usize = 3;
-const GROUPS: usize = 6;
-/// Places of the photo that agree on a pose, from which no more views are looked at.
-const ENOUGH: usize = 40;
-/// Places of the photo that agree on a pose, from which it is no chance: of a thousand wrong matches, one agrees with
-/// a wrong pose within [`WITHIN`].
-const SUPPORTED: usize = 12;
-/// Largest reprojection error of a match that agrees, in longer sides of the photo.
-const WITHIN: f64 = 0.006;
-/// Largest distance of matches with a rendering from about the right pose, in longer sides.
-const NEAR: f64 = 0.06;
 /// Views that are aligned without matches.
 const WITHOUT_MATCHES: usize = 4;
 /// Ratios to the usual focal length that are tried where it is not known.
@@ -183,23 +172,47 @@ impl Locator {
         }
         let gray = GrayPlane::of_photo(photo);
         let alike = self.gallery.alike(&gray, lens);
-        let seen = features(&gray, MOST_FEATURES);
-        let within_px = WITHIN * f64::from(width.max(height));
         let focals = if focal == FocalKnowledge::Unknown { &FOCALS[..] } else { &FOCALS[..1] };
-        let (found, agreeing) = self.by_matches(&seen, &alike, lens, focals, within_px, observer)?;
-        let mut starts: Vec<Camera> = found.map(|f| f.camera).into_iter().collect();
-        let is_supported = agreeing >= SUPPORTED;
+        let seen = SeenPhoto { features: features(&gray, MOST_FEATURES), lens, focals };
+        let found = matched(&mut self.gallery, &seen, &alike, &ORDINARY, observer)?;
+        let ordinary = self.settled(photo, lens, focal, found, &alike, observer)?;
+        if ordinary.accepted {
+            return Ok(ordinary);
+        }
+        let found = matched(&mut self.gallery, &seen, &alike, &CLOSE_UPS, observer)?;
+        if !found.is_supported() {
+            return Ok(ordinary);
+        }
+        let close_up = self.settled(photo, lens, focal, found, &alike, observer)?;
+        Ok(if close_up.accepted { close_up } else { ordinary })
+    }
+
+    /// The pose after alignment, and whether the photo shows the scene there. Where matches do not support a pose, the
+    /// views most alike are tried, too.
+    fn settled(
+        &mut self,
+        photo: &PhotoPixels,
+        lens: &Camera,
+        focal: FocalKnowledge,
+        found: MatchedPose,
+        alike: &[AlikeView],
+        observer: &dyn Observer,
+    ) -> Result<FoundPlace, LocateError> {
+        let (is_supported, agreeing) = (found.is_supported(), found.agreeing);
+        let mut starts: Vec<Camera> = found.pose.map(|f| f.camera).into_iter().collect();
         if !is_supported {
-            starts.extend(alike.into_iter().take(WITHOUT_MATCHES).map(|view| view.pose));
+            starts.extend(alike.iter().take(WITHOUT_MATCHES).map(|view| view.pose.clone()));
         }
         let (aligned, level) = self.aligned(photo, lens, starts, focal, is_supported, observer)?;
-        let Likeness { explained, correlation } = compare(&aligned, &level);
+        // Small pictures are alike by luck more often: without support, all of the photo's detail must be explained.
+        let samples = is_supported.then(|| self.gallery.samples_across(&aligned.camera, &aligned.frame)).flatten();
+        let Likeness { explained, correlation } = compare(&aligned, &level, compared_px(samples));
         let accepted = match is_supported {
             true => explained >= EXPLAINED && correlation >= CORRELATION,
             false => explained >= EXPLAINED_ALONE,
         };
         Ok(FoundPlace {
-            camera: aligned.camera.resized(width, height),
+            camera: aligned.camera.resized(photo.width_px, photo.height_px),
             accepted,
             explained,
             correlation,
@@ -207,46 +220,6 @@ impl Locator {
             gain: aligned.exposure.gain,
             covariance: covariance(&aligned.curvature, focal),
         })
-    }
-
-    /// The pose that most matches agree on, and the number of places of the photo that do.
-    fn by_matches(
-        &mut self,
-        seen: &[PictureFeature],
-        alike: &[AlikeView],
-        lens: &Camera,
-        focals: &[f64],
-        within_px: f64,
-        observer: &dyn Observer,
-    ) -> Result<(Option<Consensus>, usize), LocateError> {
-        let mut best: (Option<Consensus>, usize) = (None, 0);
-        for group in alike.chunks(GROUP).take(GROUPS) {
-            observer.proceed()?;
-            let mut matches = Vec::new();
-            for view in group {
-                let known = self.gallery.features(view.view)?;
-                let found = pairs(seen, &known, |_, _| true);
-                matches.extend(found.into_iter().map(|(i, j)| PointMatch { pixel: seen[i].at, world: known[j].world }));
-            }
-            keep_better(&mut best, consensus(&matches, lens, focals, within_px), &matches);
-            if best.1 >= ENOUGH {
-                break;
-            }
-        }
-        // From about the right place nearly everything looks alike, and nearly nothing else is near.
-        if let (Some(found), SUPPORTED..) = (&best.0, best.1) {
-            observer.proceed()?;
-            let near = NEAR * within_px / WITHIN;
-            let known = self.gallery.features_from(&found.camera)?;
-            let pairs = pairs(seen, &known, |a: DVec2, b: DVec2| a.distance_squared(b) < near * near);
-            let matches: Vec<PointMatch> =
-                pairs.into_iter().map(|(i, j)| PointMatch { pixel: seen[i].at, world: known[j].world }).collect();
-            let spread = [1.0, 0.94, 1.06];
-            let focals = if focals.len() > 1 { &spread[..] } else { &spread[..1] };
-            let lens = Camera { focal_px: found.camera.focal_px, ..lens.clone() };
-            keep_better(&mut best, consensus(&matches, &lens, focals, within_px), &matches);
-        }
-        Ok(best)
     }
 
     /// The best of the poses after alignment, and the photo at that size.
@@ -278,7 +251,7 @@ impl Locator {
                 let bounds: FocalBounds = most.map(|most| [-most - changed, most - changed]);
                 let steps = if px == self.finest_px { FINEST_STEPS } else { STEPS };
                 let aligned = align(&mut self.gallery, &level, &start, bounds, steps)?;
-                let alike = compare(&aligned, &level);
+                let alike = compare(&aligned, &level, COMPARED_PX);
                 if best.as_ref().is_none_or(|(most, _)| alike.sum() > most.sum()) {
                     best = Some((alike, aligned));
                 }
@@ -294,23 +267,10 @@ impl Locator {
     }
 }
 
-/// Keeps the pose on which more places of the photo agree.
-fn keep_better(best: &mut (Option<Consensus>, usize), found: Option<Consensus>, matches: &[PointMatch]) {
-    let Some(found) = found else { return };
-    // A place that matches points of several views counts once.
-    let mut places: Vec<[u64; 2]> =
-        found.inliers.iter().map(|&i| matches[i].pixel.to_array().map(f64::to_bits)).collect();
-    places.sort_unstable();
-    places.dedup();
-    if places.len() > best.1 {
-        *best = (Some(found), places.len());
-    }
-}
-
-/// Likeness of a rendering at its pose, in the photo's exposure, with the photo.
-fn compare(aligned: &Aligned, level: &PhotoLevel) -> Likeness {
+/// Likeness of a rendering at its pose, in the photo's exposure, with the photo, at most so large.
+fn compare(aligned: &Aligned, level: &PhotoLevel, most_px: usize) -> Likeness {
     let rendered = GrayPlane::of_planes(&aligned.exposure.applied(&aligned.frame.color), level.width);
-    likeness(&rendered, &GrayPlane::of_planes(&level.planes, level.width), &level.coverage)
+    likeness(&rendered, &GrayPlane::of_planes(&level.planes, level.width), &level.coverage, most_px)
 }
 
 /// Covariance of a pose from the curvature of the loss there.

@@ -1,12 +1,15 @@
 //! Photos rendered of a made-up scene are located in it; photos of other things are refused.
 
-use glam::{DMat3, DQuat, DVec3};
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+use glam::{DMat3, DQuat, DVec2, DVec3};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 
-use super::testing::{at, scene, settings};
+use super::matched::SUPPORTED;
+use super::testing::{at, fine_scene, scene, settings};
 use super::*;
-use crate::pipeline::observer::Silent;
+use crate::pipeline::observer::{Signal, Silent};
 use crate::render::{Features, Renderer};
 
 fn ring() -> Vec<Camera> {
@@ -104,6 +107,71 @@ fn a_close_up_is_located() {
     near.world_from_camera *= DMat3::from_quat(DQuat::from_scaled_axis(DVec3::new(0.1, 0.05, 0.0)));
     let found = locator.locate(&photo(&cloud, &near, |_, _, v| v), &lens(), FocalKnowledge::Known, &Silent);
     assert_found(&found.expect("located"), &near);
+}
+
+/// The fine scene as it is seen from afar in small photos.
+fn locator_from_afar() -> Locator {
+    let cameras: Vec<Camera> = ring().iter().map(|camera| camera.resized(240, 180)).collect();
+    Locator::new(fine_scene(1), &settings(), &cameras, 256, &mut Silent).expect("cameras")
+}
+
+/// Five times nearer than the ring, between two of its cameras: it shows what 50 px of their photos show.
+fn close_up(turn: f64, target: DVec3) -> Camera {
+    let toward = DVec3::new(3.3 * turn.cos(), 3.3 * turn.sin(), 2.5).normalize_or(DVec3::Z);
+    Camera::look_at(target + 0.85 * toward, target, DVec3::Z, 0.75, 512, 384).expect("valid")
+}
+
+#[test]
+fn a_close_up_that_ordinary_views_are_too_coarse_for_is_located() {
+    let (mut locator, cloud) = (locator_from_afar(), fine_scene(1));
+    // Others by exposure, too.
+    for (turn, target, gain) in [(0.47, DVec3::new(0.4, 0.2, 0.4), 1.0), (2.0, DVec3::new(-0.3, 0.5, 0.2), 0.75)] {
+        let near = close_up(turn, target);
+        let taken = photo(&cloud, &near, |_, _, v| gain * v);
+        let lens = close_up(0.0, DVec3::new(5.0, 5.0, 5.0));
+        let gray = GrayPlane::of_photo(&taken);
+        let seen = SeenPhoto { features: features(&gray, MOST_FEATURES), lens: &lens, focals: &[1.0] };
+        let alike = locator.gallery.alike(&gray, &lens);
+        // Negative control: without finer views, nothing is found.
+        let found = matched(&mut locator.gallery, &seen, &alike, &ORDINARY, &Silent).expect("looked for");
+        assert!(!found.is_supported(), "{}", found.agreeing);
+        let found = locator.locate(&taken, &lens, FocalKnowledge::Known, &Silent).expect("located");
+        assert_found(&found, &near);
+        assert!(found.agreeing >= 2 * SUPPORTED, "{found:?}");
+    }
+}
+
+#[test]
+fn a_close_up_of_another_scene_is_refused() {
+    let mut locator = locator_from_afar();
+    for (turn, target) in [(0.47, DVec3::new(0.4, 0.2, 0.4)), (4.1, DVec3::new(0.0, -0.6, 0.2))] {
+        let near = close_up(turn, target);
+        let other = photo(&fine_scene(2), &near, |_, _, v| v);
+        let found = locator.locate(&other, &near, FocalKnowledge::Known, &Silent).expect("looked for");
+        assert!(!found.accepted, "{found:?}");
+    }
+}
+
+/// Cancels after some queries.
+struct CancelsLater(AtomicUsize);
+
+impl Observer for CancelsLater {
+    fn signal(&self) -> Signal {
+        let left = self.0.load(Ordering::Relaxed);
+        self.0.store(left.saturating_sub(1), Ordering::Relaxed);
+        if left > 0 { Signal::Continue } else { Signal::Cancel }
+    }
+}
+
+#[test]
+fn a_search_for_close_ups_can_be_canceled_at_each_view() {
+    let mut locator = locator_from_afar();
+    let near = close_up(0.47, DVec3::new(0.4, 0.2, 0.4));
+    let gray = GrayPlane::of_photo(&photo(&fine_scene(2), &near, |_, _, v| v));
+    let alike = locator.gallery.alike(&gray, &near);
+    let seen = SeenPhoto { features: features(&gray, MOST_FEATURES), lens: &near, focals: &[1.0] };
+    let found = matched(&mut locator.gallery, &seen, &alike, &CLOSE_UPS, &CancelsLater(AtomicUsize::new(4)));
+    assert!(matches!(found, Err(LocateError::Interrupted(_))));
 }
 
 #[test]
