@@ -1,5 +1,6 @@
 //! Changes that the agent makes to the displayed scene.
 
+use std::path::PathBuf;
 use std::sync::Arc;
 
 use glam::DVec3;
@@ -27,6 +28,8 @@ pub enum Effect {
     Undone(UndoneRequest),
     /// A photo was located, after the flight there; with `true`, its difference from the scene is to be shown.
     Located(Box<LocatedPhoto>, bool),
+    /// A scene with these photos, files or folders, is made of this one.
+    AddPhotos(Vec<PathBuf>),
     /// The occupied space of the scene was computed.
     Explored(Arc<Explored>),
 }

@@ -36,7 +36,8 @@ impl CallOutcome {
             Some(kind) => kind == RefusalKind::Failed,
             // A chat model gets neither files nor cameras.
             None => {
-                matches!(self.call, ToolCall::Export { .. } | ToolCall::LocatePhoto { .. } | ToolCall::ShowChanges {})
+                use ToolCall::{AddPhotos, Export, LocatePhoto, ShowChanges};
+                matches!(self.call, Export { .. } | LocatePhoto { .. } | ShowChanges {} | AddPhotos { .. })
             }
         }
     }
@@ -46,6 +47,9 @@ impl CallOutcome {
         match self.refused {
             _ if !self.is_private() => &self.text,
             None if matches!(self.call, ToolCall::Export { .. }) => "It is written to a file; the user is told which.",
+            None if matches!(self.call, ToolCall::AddPhotos { .. }) => {
+                "The photos are being added; the new scene is shown to the user once it is done."
+            }
             None => "The photo is found, and shown to the user, who is told where it was taken.",
             Some(_) => "It failed on the user's machine; the user is told why.",
         }
@@ -358,6 +362,7 @@ fn act(
         ToolCall::Undo {} => format!("Undone: {}.", world.undo().map_err(failed)?),
         ToolCall::LocatePhoto { photo } => photo_answer::taken(world, photo.as_deref(), cancel).map_err(failed)?,
         ToolCall::ShowChanges {} => photo_answer::changed(world, cancel).map_err(failed)?,
+        ToolCall::AddPhotos { photos } => photo_answer::added(world, photos.as_deref()).map_err(failed)?,
         ToolCall::Export { .. } => format!("{} is written to {}.", capital(&it), world.export(id).map_err(failed)?),
     })
 }

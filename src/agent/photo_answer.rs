@@ -30,9 +30,15 @@ pub(super) fn changed(world: &mut dyn World, cancel: &AtomicBool) -> Result<Stri
     let sight = world.show_changes(cancel)?;
     let rest = percent(1.0 - sight.explained);
     Ok(format!(
-        "{rest} of {} is not as the scene has it. The difference is bright where something has changed, or the light has.",
+        "{rest} of {} is not as the scene has it. The difference is bright where something has changed; the photo's exposure is left out.",
         sight.name
     ))
+}
+
+/// Adds photos to the scene, and says what is made.
+pub(super) fn added(world: &mut dyn World, photos: Option<&str>) -> Result<String, WorldError> {
+    let what = world.add_photos(photos)?;
+    Ok(format!("Adding {what}: a training makes a better scene in a folder of its own; this one stays as it is."))
 }
 
 fn percent(share: f64) -> String {

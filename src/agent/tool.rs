@@ -126,6 +126,12 @@ pub enum ToolCall {
     },
     /// Show the difference of the last photo from the scene.
     ShowChanges {},
+    /// Add photos to the scene, which makes another one.
+    AddPhotos {
+        /// File or folder of photos; `None` for all that were given.
+        #[serde(default)]
+        photos: Option<String>,
+    },
 }
 
 /// Reference of a distance.
@@ -148,7 +154,7 @@ pub enum ToolError {
 }
 
 /// Names of all tools, in the order of [`ToolCall`].
-pub const NAMES: [&str; 20] = [
+pub const NAMES: [&str; 21] = [
     "locate",
     "go_to",
     "look_at",
@@ -169,6 +175,7 @@ pub const NAMES: [&str; 20] = [
     "export",
     "locate_photo",
     "show_changes",
+    "add_photos",
 ];
 
 /// Pattern of the calls that always have a target.
@@ -240,7 +247,7 @@ impl ToolCall {
                 Self::Rename { name, .. } => Some(name),
                 Self::AskUser { question, .. } => Some(question),
                 Self::List { named, .. } => named.as_ref(),
-                Self::LocatePhoto { photo } => photo.as_ref(),
+                Self::LocatePhoto { photo: file } | Self::AddPhotos { photos: file } => file.as_ref(),
                 _ => None,
             },
             match self.target() {

@@ -161,7 +161,9 @@ impl ToolCall {
             Self::Measure { to: Some(Reference::Eye), .. } => parts.push("from here".into()),
             Self::Measure { to: Some(Reference::Thing(t)), .. } => parts.push(format!("from {}", name(t))),
             Self::AskUser { question, .. } => parts.push(format!("\"{question}\"")),
-            Self::LocatePhoto { photo } => parts.extend(photo.iter().map(|file| format!("\"{file}\""))),
+            Self::LocatePhoto { photo: file } | Self::AddPhotos { photos: file } => {
+                parts.extend(file.iter().map(|file| format!("\"{file}\"")))
+            }
             _ => {}
         }
         format!("{}({})", self.name(), parts.join(", "))

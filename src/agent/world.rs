@@ -154,6 +154,12 @@ pub trait World {
         Err(WorldError("there is no photo to compare with".into()))
     }
 
+    /// Begins to make a scene of this one and the photos of a file or folder; without one, of all photos that were given.
+    /// Returns their name or number.
+    fn add_photos(&mut self, _photos: Option<&str>) -> Result<String, WorldError> {
+        Err(WorldError("photos cannot be added here".into()))
+    }
+
     /// Path of the file that [`Self::export`] would replace, if it exists.
     fn export_replaces(&self, id: IdentityId) -> Option<String>;
 }

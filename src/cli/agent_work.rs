@@ -5,10 +5,10 @@ use std::sync::Arc;
 
 use super::CliError;
 use crate::agent::scene::{AgentScene, Effect};
-use crate::jobs::JobError;
 use crate::jobs::edit::{self, EditRequest};
 use crate::jobs::error::chain;
 use crate::jobs::remove::{self, RemovalOptions, RemoveRequest};
+use crate::jobs::{JobError, add};
 use crate::pipeline::observer::Silent;
 use crate::pipeline::semantics::lifting::edit::Edit;
 use crate::scene::{GaussianCloud, IdentityId, SemanticMap};
@@ -66,6 +66,10 @@ impl SceneWork {
                 Some(folder) => self.removed(&folder, ids),
                 None => return,
             },
+            Effect::AddPhotos(photos) => match self.folder.clone() {
+                Some(folder) => self.added(&folder, photos),
+                None => return,
+            },
             Effect::Undo | Effect::Explored(_) => return,
         };
         self.done.push(line);
@@ -113,6 +117,14 @@ impl SceneWork {
         let request = RemoveRequest { folder: folder.into(), options: RemovalOptions::of(ids), retrain: false };
         match remove::run_request(&request, &mut Silent) {
             Ok(done) => format!("{}: {}", done.folder.display(), remove::summary(&done.name, &done.report)),
+            Err(e) => self.failed(e),
+        }
+    }
+
+    /// Makes a scene of the one in `folder` and these photos, and returns a line with its path.
+    fn added(&mut self, folder: &Path, photos: &[PathBuf]) -> String {
+        match add::beside(folder, photos, &mut Silent) {
+            Ok(done) => format!("{}: {}", done.out.display(), done.told(folder)),
             Err(e) => self.failed(e),
         }
     }

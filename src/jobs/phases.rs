@@ -24,6 +24,20 @@ pub(crate) const FINDING: &[Phase] = &[
     ("Embedding objects and parts", 12.0),
     ("Training codes", 10.0),
 ];
+/// Phases of adding photos to a scene.
+pub(crate) const ADDING: &[Phase] = &[
+    ("Looking at the scene", 2.0),
+    ("Locating photos", 6.0),
+    ("Loading added photos", 1.0),
+    ("Loading photos", 1.0),
+    ("Comparing photos", 3.0),
+    ("Comparing new photos", 2.0),
+    ("Looking for photos of what is refined", 2.0),
+    ("Loading photos", 1.0),
+    ("Training", 78.0),
+    ("Measuring", 2.0),
+    ("Finding parts in close-ups", 2.0),
+];
 /// Phases of a removal.
 pub(crate) const REMOVAL: &[Phase] = &[
     ("Finding hidden surfaces", 30.0),
@@ -216,7 +230,9 @@ mod tests {
             sources(&std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join(folder), &mut all);
         }
         let is_stage = |name: &str| all.contains(&format!("\"{name}"));
-        for (name, _) in [TRAINING, FINDING, REMOVAL, RETRAINING, CLEANING, POSES, EXPORT, EXPORT_ALL, DEMO].concat() {
+        for (name, _) in
+            [TRAINING, FINDING, ADDING, REMOVAL, RETRAINING, CLEANING, POSES, EXPORT, EXPORT_ALL, DEMO].concat()
+        {
             assert!(is_stage(name), "{name}");
         }
         assert!(!is_stage("Looking for a stage that nobody reports"));

@@ -138,6 +138,10 @@ const OFFERS: &[(&[&str], Offered)] = &[
     (&["split|divide {}"], OnThing(|id| Action::Change(Edit::Split(id)))),
     (&["correct|fix|refine {}", "mask|outline|extent of {}"], OnThing(Action::Correct)),
     (
+        &["add|include photo|picture|image", "more|additional photo|picture|image"],
+        These(|| vec![Action::AddFolder, Action::AddPhoto]),
+    ),
+    (
         &["select|mark|add|create|make|define new object|thing", "add|mark|label object"],
         These(|| vec![Action::SegmentNew(Some(NO_IDENTITY))]),
     ),
@@ -304,6 +308,7 @@ mod tests {
             ("what is the PSNR of this?", Action::Evaluate),
             ("segment the scene", Action::FindObjects),
             ("use my own masks", Action::ChooseMasks),
+            ("can it be made sharper with more photos?", Action::AddFolder),
             ("save this chat", Action::SaveChat),
         ] {
             assert_eq!(first(sentence), Some(action), "{sentence}");

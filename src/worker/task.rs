@@ -41,6 +41,20 @@ pub enum Makes {
     Gaussians,
     /// Objects and parts.
     Objects,
+    /// A scene beside the open one, by a training that the same request goes on with.
+    SceneBeside,
+}
+
+impl Makes {
+    /// Returns whether the scene on screen is another one afterwards.
+    pub(crate) fn changes_scene(self) -> bool {
+        !matches!(self, Self::Nothing | Self::SceneBeside)
+    }
+
+    /// Returns whether it is a training, of the open scene or of one beside it.
+    pub(crate) fn is_training(self) -> bool {
+        matches!(self, Self::Gaussians | Self::SceneBeside)
+    }
 }
 
 /// Description of a job for the worker, the status bar and the log.

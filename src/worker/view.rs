@@ -218,7 +218,7 @@ fn maps_of(renderer: &mut Renderer, request: &ViewRequest, camera: &Camera) -> O
 mod tests {
     use super::*;
     use crate::render::RenderSettings;
-    use crate::scene::{GaussianCloud, SemanticMap};
+    use crate::scene::{GaussianCloud, PhotoExposure, SemanticMap};
     use crate::scene::{Identities, Level, NO_IDENTITY};
     use crate::worker::Versioned;
     use crate::worker::view_modes::ViewMode;
@@ -242,6 +242,7 @@ mod tests {
                 settings: RenderSettings::default(),
                 budget: QualityBudget::Full,
                 photo: None,
+                exposure: PhotoExposure::default(),
                 semantics: Some(Versioned::new(Arc::new(map.clone()))),
                 follow: false,
                 codes: true,

@@ -8,7 +8,7 @@ use crate::math::resize::{Filter, nearest, resize};
 use crate::math::stats::quantile;
 use crate::pipeline::metrics;
 use crate::render::Frame;
-use crate::scene::PhotoPixels;
+use crate::scene::{PhotoExposure, PhotoPixels};
 
 /// Quantity that the viewport shows, in the order of the toolbar.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize, VariantArray, IntoStaticStr)]
@@ -39,7 +39,7 @@ impl ViewMode {
 }
 
 /// Factor that amplifies the difference from the photo, so that an error of 1/4 is white.
-pub(crate) const DIFFERENCE_GAIN: u16 = 4;
+pub(crate) const DIFFERENCE_GAIN: f64 = 4.0;
 
 /// A frame as pixels.
 #[derive(Debug, Default, PartialEq)]
@@ -50,8 +50,13 @@ pub(super) struct Drawn {
 }
 
 /// Turns a frame into pixels. A photo of another size than the frame is sampled at the pixels'
-/// centers.
-pub(super) fn paint(frame: &Frame<f32>, mode: ViewMode, photo: Option<&PhotoPixels>) -> Drawn {
+/// centers. Its difference is measured without its exposure.
+pub(super) fn paint(
+    frame: &Frame<f32>,
+    mode: ViewMode,
+    photo: Option<&PhotoPixels>,
+    exposure: &PhotoExposure,
+) -> Drawn {
     let photo = photo.filter(|p| p.len() == p.width_px as usize * p.height_px as usize && !p.is_empty());
     let rgb = || frame.to_rgb8();
     // An exact match has no finite PSNR; none is shown for it.
@@ -66,7 +71,7 @@ pub(super) fn paint(frame: &Frame<f32>, mode: ViewMode, photo: Option<&PhotoPixe
             let rgb = frame.alpha.iter().map(|a| [(a.clamp(0.0, 1.0) * 255.0 + 0.5) as u8; 3]).collect();
             Drawn { rgb, depth_range: None, psnr }
         }
-        (ViewMode::Difference, Some(p)) => Drawn { rgb: difference(frame, p), depth_range: None, psnr },
+        (ViewMode::Difference, Some(p)) => Drawn { rgb: difference(frame, p, exposure), depth_range: None, psnr },
         (ViewMode::Photo, Some(p)) => {
             let (from, to) = ((p.width_px as usize, p.height_px as usize), (frame.width_px, frame.height_px));
             Drawn { rgb: resize(&p.rgb, from, to, Filter::Bilinear), depth_range: None, psnr }
@@ -90,15 +95,24 @@ fn depth(frame: &Frame<f32>) -> (Vec<[u8; 3]>, Option<(f32, f32)>) {
     (depths.iter().map(|d| Colormap::Turbo.color((d - near) / span)).collect(), Some((near, far)))
 }
 
-/// The amplified difference of every pixel that the photo covers.
-fn difference(frame: &Frame<f32>, photo: &PhotoPixels) -> Vec<[u8; 3]> {
+/// The amplified difference of every pixel that the photo covers, in the scene's exposure. What the photo's camera clipped
+/// is no difference.
+fn difference(frame: &Frame<f32>, photo: &PhotoPixels, exposure: &PhotoExposure) -> Vec<[u8; 3]> {
     let (w, h) = (photo.width_px as usize, photo.height_px as usize);
+    let PhotoExposure { gain, bias } = exposure;
+    // Each value of the rendering as the photo's camera would have taken it.
+    let taken: [[f64; 256]; 3] = std::array::from_fn(|c| {
+        std::array::from_fn(|value| (gain[c] * value as f64 + 255.0 * bias[c]).clamp(0.0, 255.0))
+    });
     let pixel = |(i, drawn): (usize, [u8; 3])| {
         let (x, y) = (i % frame.width_px, i / frame.width_px);
         let at = nearest(y, h, frame.height_px) * w + nearest(x, w, frame.width_px);
         let covered = photo.coverage.as_ref().is_none_or(|c| c[at] > 127);
-        let off = |c: usize| u16::from(drawn[c].abs_diff(photo.rgb[at][c])) * DIFFERENCE_GAIN;
-        if covered { std::array::from_fn(|c| u8::try_from(off(c)).unwrap_or(u8::MAX)) } else { [0; 3] }
+        let off = |c: usize| {
+            let off = (taken[c][usize::from(drawn[c])] - f64::from(photo.rgb[at][c])).abs() / gain[c];
+            (DIFFERENCE_GAIN * off).round() as u8
+        };
+        if covered { std::array::from_fn(off) } else { [0; 3] }
     };
     frame.to_rgb8().into_iter().enumerate().map(pixel).collect()
 }
@@ -119,22 +133,48 @@ mod tests {
         }
     }
 
+    const AS_IS: PhotoExposure = PhotoExposure { gain: [1.0; 3], bias: [0.0; 3] };
+
     fn photo(level: u8, coverage: Option<Vec<u8>>) -> PhotoPixels {
         PhotoPixels { width_px: 2, height_px: 2, rgb: vec![[level; 3]; 4], coverage, alpha: None }
     }
 
     #[test]
     fn difference_is_amplified_and_ignores_uncovered_pixels() {
-        let drawn = paint(&frame(0.0), ViewMode::Difference, Some(&photo(10, Some(vec![255, 255, 0, 255]))));
+        let drawn = paint(&frame(0.0), ViewMode::Difference, Some(&photo(10, Some(vec![255, 255, 0, 255]))), &AS_IS);
         assert_eq!(drawn.rgb, vec![[40; 3], [40; 3], [0; 3], [40; 3]]);
         let psnr = drawn.psnr.expect("they differ");
         assert!((psnr - 20.0 * 25.5_f64.log10()).abs() < 1e-9, "{psnr}");
-        assert_eq!(paint(&frame(0.0), ViewMode::Rgb, Some(&photo(0, None))).psnr, None);
+        assert_eq!(paint(&frame(0.0), ViewMode::Rgb, Some(&photo(0, None)), &AS_IS).psnr, None);
+    }
+
+    #[test]
+    fn a_photo_in_other_light_differs_only_where_something_has_changed() {
+        // Half as bright again, and a little more; the last pixel of the scene has changed.
+        let exposure = PhotoExposure { gain: [1.5, 1.5, 0.5], bias: [0.1, 0.0, 0.0] };
+        let scene = frame(0.4);
+        let taken = |v: f64| exposure.gain.map(|gain| gain * v * 255.0);
+        let mut picture = photo(0, None);
+        picture.rgb = vec![std::array::from_fn(|c| (taken(0.4)[c] + 255.0 * exposure.bias[c]).round() as u8); 4];
+        picture.rgb[3] = [20, 20, 120];
+        let of = |exposure: &PhotoExposure| paint(&scene, ViewMode::Difference, Some(&picture), exposure).rgb;
+        let without = of(&exposure);
+        assert!(without[..3].as_flattened().iter().all(|v| *v <= 8), "{without:?}");
+        assert!(without[3].iter().all(|v| *v > 200), "the change stays: {without:?}");
+        assert!(
+            of(&AS_IS)[..3].as_flattened().iter().all(|v| *v > 100),
+            "the control: with its exposure all is bright"
+        );
+        // What the camera clipped is not darker than the scene.
+        let white = photo(255, None);
+        let clipped = PhotoExposure { gain: [1.5; 3], ..AS_IS };
+        let drawn = paint(&frame(0.9), ViewMode::Difference, Some(&white), &clipped);
+        assert_eq!(drawn.rgb, vec![[0; 3]; 4]);
     }
 
     #[test]
     fn depth_runs_from_near_to_far_and_leaves_holes_black() {
-        let drawn = paint(&frame(0.5), ViewMode::Depth, None);
+        let drawn = paint(&frame(0.5), ViewMode::Depth, None, &AS_IS);
         let (near, far) = drawn.depth_range.expect("something is there");
         assert!((1.0..1.1).contains(&near) && (2.9..=3.0).contains(&far));
         assert_eq!(drawn.rgb[3], [0; 3]);
@@ -150,10 +190,10 @@ mod tests {
             coverage: None,
             alpha: None,
         };
-        assert_eq!(paint(&frame(0.0), ViewMode::Photo, Some(&photo(7, None))).rgb, vec![[7; 3]; 4], "as it is");
-        assert_eq!(paint(&frame(0.0), ViewMode::Photo, Some(&big)).rgb.len(), 4);
-        assert_eq!(paint(&frame(0.0), ViewMode::Photo, None).rgb, vec![[0; 3]; 4], "the rendering without one");
-        let drawn = paint(&frame(0.0), ViewMode::Difference, Some(&big));
+        assert_eq!(paint(&frame(0.0), ViewMode::Photo, Some(&photo(7, None)), &AS_IS).rgb, vec![[7; 3]; 4], "as it is");
+        assert_eq!(paint(&frame(0.0), ViewMode::Photo, Some(&big), &AS_IS).rgb.len(), 4);
+        assert_eq!(paint(&frame(0.0), ViewMode::Photo, None, &AS_IS).rgb, vec![[0; 3]; 4], "the rendering without one");
+        let drawn = paint(&frame(0.0), ViewMode::Difference, Some(&big), &AS_IS);
         assert_eq!(drawn.rgb.iter().map(|p| p[0] / 4).collect::<Vec<_>>(), vec![5, 7, 13, 15]);
     }
 }

@@ -166,7 +166,7 @@ impl ViewRenderer {
                 (nothing(), None, None)
             }
             Painting::Frame(frame) => {
-                let paint = |mode| view_modes::paint(&frame, mode, request.photo.as_deref());
+                let paint = |mode| view_modes::paint(&frame, mode, request.photo.as_deref(), &request.exposure);
                 let second = request.second.map(|mode| {
                     let view_modes::Drawn { rgb, depth_range, psnr } = paint(mode);
                     PictureBeside { rgb, depth_range, psnr }
@@ -294,6 +294,7 @@ mod tests {
             settings: RenderSettings::default(),
             budget: QualityBudget::Moving,
             photo: None,
+            exposure: Default::default(),
             semantics: None,
             follow: false,
             codes: false,

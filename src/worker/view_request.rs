@@ -9,7 +9,7 @@ use super::failure::Failure;
 use super::view_modes::ViewMode;
 use crate::render::lod::MOVING_SECS;
 use crate::render::{DevicePicture, GpuError, RenderSettings, Renderer, StageTimes};
-use crate::scene::{Camera, GaussianCloud, PhotoPixels, ScenePlan, SemanticMap};
+use crate::scene::{Camera, GaussianCloud, PhotoExposure, PhotoPixels, ScenePlan, SemanticMap};
 
 /// Request to draw a view.
 #[derive(Clone, Debug)]
@@ -30,6 +30,8 @@ pub struct ViewRequest {
     pub budget: QualityBudget,
     /// The photo taken from this camera, for the difference and for PSNR.
     pub photo: Option<Arc<PhotoPixels>>,
+    /// Exposure of the photo beside the scene's colors, which is no difference.
+    pub exposure: PhotoExposure,
     /// Objects and parts of the Gaussians, whose maps are drawn too once the camera rests.
     pub semantics: Option<Versioned<SemanticMap>>,
     /// True if they are drawn while the camera moves too, at the frame's resolution: masks are on screen.
@@ -57,7 +59,7 @@ impl ViewRequest {
             && others(self) == others(other)
             && self.settings == other.settings
             && (self.budget, self.skip, self.timed) == (other.budget, other.skip, other.timed)
-            && self.photo.is_some() == other.photo.is_some()
+            && (self.photo.is_some(), self.exposure) == (other.photo.is_some(), other.exposure)
             && (self.codes, self.follow) == (other.codes, other.follow)
     }
 

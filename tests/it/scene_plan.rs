@@ -17,8 +17,8 @@ use fmlgs::render::{BackendChoice, Features, Frame, RenderSettings, Renderer};
 use fmlgs::scene::plan::{NOISE_FLOOR, When};
 use fmlgs::scene::resource_log::{self, ResourceKind};
 use fmlgs::scene::{
-    Camera, GaussianCloud, Identities, Level, Limits, Machine, NO_IDENTITY, Overrides, SceneFacts, ScenePlan,
-    SemanticMap,
+    Camera, GaussianCloud, Identities, Level, Limits, Machine, NO_IDENTITY, Overrides, PhotoExposure, SceneFacts,
+    ScenePlan, SemanticMap,
 };
 use fmlgs::worker::view::{QualityBudget, RenderThread, SkipPasses, ViewRequest};
 use fmlgs::worker::{Versioned, ViewMode};
@@ -169,6 +169,7 @@ fn looked_at(cloud: &GaussianCloud, map: Option<&SemanticMap>, plan: &ScenePlan,
         settings: RenderSettings::default(),
         budget,
         photo: None,
+        exposure: PhotoExposure::default(),
         semantics,
         follow: false,
         codes: false,

@@ -1,6 +1,6 @@
 //! Completion while typing, from the commands and from the names in the scene.
 
-use super::form::{FormItem, FormRequest, FormSlot, Things, is_file, sequences};
+use super::form::{FormItem, FormRequest, FormSlot, Things, is_file, is_folder, sequences};
 use super::{SEPARATORS, clauses};
 use crate::agent::language::CommandLanguage;
 use crate::agent::names::NameWords;
@@ -85,6 +85,7 @@ impl Kept<'_> {
                         _ if names => self.known.is_thing(&words[..end], true),
                         FormSlot::Name => true,
                         FormSlot::Photo => is_file(&said),
+                        FormSlot::Folder => is_folder(&said),
                         FormSlot::Distance | FormSlot::Angle => words[0].starts_with(|c: char| c.is_ascii_digit()),
                         _ => options.contains(&said),
                     };
@@ -126,7 +127,7 @@ impl Kept<'_> {
             FormSlot::Distance => fixed(&["20 cm", "half a meter", "two steps", "a bit"]),
             FormSlot::Angle => fixed(&["90 degrees", "45 degrees"]),
             FormSlot::Most => LanguageWords::get().superlatives().map(str::to_owned).collect(),
-            FormSlot::Name | FormSlot::Photo => Vec::new(),
+            FormSlot::Name | FormSlot::Photo | FormSlot::Folder => Vec::new(),
         }
     }
 }

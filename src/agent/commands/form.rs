@@ -30,6 +30,7 @@ pub(super) enum FormSlot {
     Angle,
     Most,
     Photo,
+    Folder,
 }
 
 /// Item of a form: a fixed word or a slot.
@@ -67,7 +68,7 @@ pub(crate) struct Slots {
     pub(super) distance: Option<Distance>,
     pub(super) degrees: Option<f64>,
     pub(super) most: Option<String>,
-    /// File of a photo, as typed.
+    /// File of a photo or folder of photos, as typed.
     pub(super) photo: Option<String>,
 }
 
@@ -151,6 +152,7 @@ fn item(word: &str) -> FormItem {
         "{angle}" => FormSlot::Angle,
         "{most}" => FormSlot::Most,
         "{photo}" => FormSlot::Photo,
+        "{folder}" => FormSlot::Folder,
         word => return FormItem::Word(word.to_owned()),
     })
 }
@@ -213,10 +215,10 @@ impl FormRequest<'_> {
         self.known.whole(words).filter(|name| key(name) != key(&said)).map_or(said, str::to_owned)
     }
 
-    /// File of a photo that the words from `at` to `end` name, as typed.
-    fn file(&self, at: usize, end: usize) -> Option<String> {
+    /// File or folder that the words from `at` to `end` name, as typed, if `is_one` says that it is one.
+    fn path(&self, at: usize, end: usize, is_one: fn(&str) -> bool) -> Option<String> {
         let (first, last) = (self.tokens.get(at)?, self.tokens.get(end - 1)?);
-        let typed = self.text.get(first.at.start..last.at.end).filter(|typed| is_file(typed))?;
+        let typed = self.text.get(first.at.start..last.at.end).filter(|typed| is_one(typed))?;
         Some(typed.trim_matches(|c: char| QUOTES.contains(c)).trim().to_owned())
     }
 
@@ -275,7 +277,11 @@ impl FormRequest<'_> {
                 slots.degrees.is_some()
             }
             FormSlot::Photo => {
-                slots.photo = self.file(at, end);
+                slots.photo = self.path(at, end, is_file);
+                slots.photo.is_some()
+            }
+            FormSlot::Folder => {
+                slots.photo = self.path(at, end, is_folder);
                 slots.photo.is_some()
             }
             FormSlot::Most => {
@@ -294,6 +300,13 @@ pub(super) fn is_file(text: &str) -> bool {
     let joins = |word: &str| matches!(word, "and" | "then") || word.ends_with(',');
     let is_one = text.starts_with(|c: char| QUOTES.contains(c)) || !text.split_whitespace().any(joins);
     is_one && is_picture(Path::new(text.trim_matches(|c: char| QUOTES.contains(c))))
+}
+
+/// Returns whether a text is the path of a folder: in quotes, or one word with a separator.
+pub(super) fn is_folder(text: &str) -> bool {
+    let inside = text.trim_matches(|c: char| QUOTES.contains(c)).trim();
+    let is_quoted = text.starts_with(|c: char| QUOTES.contains(c)) && !inside.contains(|c: char| QUOTES.contains(c));
+    !inside.is_empty() && (is_quoted || !text.contains(char::is_whitespace) && text.contains(['/', '\\']))
 }
 
 fn quoted(words: &[&str]) -> String {

@@ -52,6 +52,7 @@ pub(super) fn task(id: &str, slots: &Slots) -> Option<CommandStep> {
         "export" => ToolCall::Export { target: thing(0)? },
         "undo" => ToolCall::Undo {},
         "locate_photo" => ToolCall::LocatePhoto { photo: slots.photo.clone() },
+        "add_photos" => ToolCall::AddPhotos { photos: slots.photo.clone() },
         "changes" => ToolCall::ShowChanges {},
         "distance" => measure(Some(Reference::Eye))?,
         "apart" => measure(Some(Reference::Thing(thing(1)?)))?,

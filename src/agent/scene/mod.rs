@@ -353,6 +353,10 @@ impl World for SceneWorld {
         photos::locate(self, None, true, cancel)
     }
 
+    fn add_photos(&mut self, photos: Option<&str>) -> Result<String, WorldError> {
+        photos::add(self, photos)
+    }
+
     fn export_replaces(&self, id: IdentityId) -> Option<String> {
         let file = self.export_file(id);
         file.exists().then(|| file.display().to_string())

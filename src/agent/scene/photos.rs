@@ -6,8 +6,9 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use super::{Effect, SceneWorld, moves};
 use crate::agent::world::{PhotoSight, WorldError};
 use crate::jobs::error::chain;
-use crate::jobs::locate::LocatedPhoto;
 use crate::jobs::locate::kept::PhotoLocator;
+use crate::jobs::locate::{LocatedPhoto, file_name};
+use crate::math::format::things;
 use crate::navigate::Pose;
 use crate::pipeline::observer::{Observer, Signal};
 
@@ -40,6 +41,30 @@ impl ScenePhotos {
             false => Err(WorldError(format!("there is no file '{photo}': give its path"))),
         }
     }
+
+    /// Files and folders that are meant: the given file of this name, or what is at this path; without a name, all given
+    /// files.
+    fn added(&self, photos: Option<&str>) -> Result<Vec<PathBuf>, WorldError> {
+        match photos {
+            Some(path) if Path::new(path).is_dir() => Ok(vec![path.into()]),
+            None if !self.given.is_empty() => Ok(self.given.clone()),
+            photo => Ok(vec![self.file(photo)?]),
+        }
+    }
+}
+
+/// Adds photos to the scene, and returns their name or number.
+pub(super) fn add(scene: &mut SceneWorld, photos: Option<&str>) -> Result<String, WorldError> {
+    let paths = scene.photos.added(photos)?;
+    if scene.parts.folder.is_none() {
+        return Err(WorldError("photos are added only to a trained scene with a folder of its own".into()));
+    }
+    let said = match paths.as_slice() {
+        [one] => file_name(one),
+        all => things(all.len(), "photo"),
+    };
+    (scene.emit)(Effect::AddPhotos(paths));
+    Ok(said)
 }
 
 /// Observer of a request of the agent.
@@ -180,6 +205,34 @@ mod tests {
         world.photos.given.push(place.photo.clone());
         assert!(say(&mut session, &mut world, "where was this photo taken?").refused.is_none());
         assert_eq!(shown(&effects).len(), 1);
+    }
+
+    #[test]
+    fn photos_and_folders_are_added_to_a_scene_that_has_a_folder() {
+        let place = TestPlace::new();
+        let ((mut world, effects), mut session) = (world(&place), session());
+        let added = |effects: &Effects| {
+            let of = |effect: &Effect| if let Effect::AddPhotos(paths) = effect { Some(paths.clone()) } else { None };
+            effects.lock().expect("no panic").iter().filter_map(of).collect::<Vec<_>>()
+        };
+        let folder = place.photo.parent().expect("a folder").to_path_buf();
+        let sentence = format!("add the photos in \"{}\"", folder.display());
+        let reply = say(&mut session, &mut world, &sentence);
+        assert!(reply.refused.is_some() && reply.text.contains("with a folder of its own"), "{}", reply.text);
+        world.parts.folder = Some(folder.clone());
+        for (sentence, why) in [("add these photos", "No photo was given yet"), ("add gone.jpg", "There is no file")] {
+            let reply = say(&mut session, &mut world, sentence);
+            assert!(reply.refused.is_some() && reply.text.contains(why), "{}", reply.text);
+        }
+        assert!(added(&effects).is_empty());
+        let reply = say(&mut session, &mut world, &sentence);
+        assert!(reply.refused.is_none() && reply.text.contains("this one stays as it is"), "{}", reply.text);
+        world.photos.given = vec![place.photo.clone(), place.other_photo()];
+        assert!(say(&mut session, &mut world, "add photo.png to the scene").refused.is_none(), "its name is enough");
+        let reply = say(&mut session, &mut world, "add these photos to the scene");
+        assert!(reply.text.contains("2 photos"), "{}", reply.text);
+        let given = world.photos.given.clone();
+        assert_eq!(added(&effects), [vec![folder], vec![place.photo.clone()], given]);
     }
 
     #[test]

@@ -10,6 +10,7 @@ use crate::io::joined::AddedPhoto;
 use crate::io::{self, OpenError, Opened, files, photo};
 use crate::jobs::error::chain;
 use crate::jobs::locate::{self, DEFAULT_PX, LocateOptions};
+use crate::jobs::open::{self, Contents};
 use crate::jobs::{JobError, Scene};
 use crate::math::format::things;
 use crate::pipeline::observer::{Observer, Severity};
@@ -152,6 +153,15 @@ fn posed(path: &Path) -> Result<Result<Dataset, Vec<PathBuf>>, JobError> {
     if pictures.is_empty() { Err(refusal.into()) } else { Ok(Err(pictures)) }
 }
 
+/// Returns whether a folder holds photos, posed or not, and neither a scene nor a result.
+pub(crate) fn holds_photos(folder: &Path) -> bool {
+    match open::contents(folder, None) {
+        Ok(Contents::Photos(_)) => true,
+        Err(JobError::Open(_)) => posed(folder).is_ok_and(|found| found.is_err()),
+        Ok(Contents::Scene(_)) | Err(_) => false,
+    }
+}
+
 /// Checks that a photo can be read and is no speck.
 fn readable(photo: &Photo) -> Result<(), String> {
     let (width, height) = (photo.camera.width_px, photo.camera.height_px);
@@ -197,6 +207,12 @@ mod tests {
         assert!(found.added.iter().all(|p| !p.located && p.camera.center.distance(camera.center) < 1e-9));
         assert_eq!(found.refused.len(), 1);
         assert!(found.refused[0].photo.ends_with("speck.png"), "{:?}", found.refused);
+        assert!(holds_photos(&at("new")) && holds_photos(&at("new/a")), "posed, and a picture that is not");
+        std::fs::create_dir(at("empty")).expect("made");
+        let cloud = crate::scene::GaussianCloud::isotropic(vec![[0.0; 3]; 3], -3.0, 1.0);
+        std::fs::create_dir(at("splats")).expect("made");
+        crate::io::splat_ply::write(&at("splats/a.ply"), &cloud).expect("written");
+        assert!(["gone", "empty", "splats"].iter().all(|name| !holds_photos(&at(name))), "the control");
         let gone = gather(&Scene::default(), &dataset, &[at("gone")], None, &mut Silent).expect_err("gone").to_string();
         assert!(gone.contains("does not exist"), "{gone}");
     }

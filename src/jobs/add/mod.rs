@@ -8,6 +8,7 @@ mod align;
 mod begin;
 mod finish;
 mod gather;
+mod told;
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -18,20 +19,22 @@ use serde_json::json;
 
 pub(crate) use self::begin::RefinedShare;
 pub(crate) use self::finish::HeldOutScores;
-pub(crate) use self::gather::RefusedPhoto;
+pub(crate) use self::gather::{RefusedPhoto, holds_photos};
 use super::refined::at_refined_poses;
 use super::train::{IfChanged, TrainStart, Trained};
 use super::{JobError, Scene, derived, open, train};
 use crate::io::joined::{self, AddedPhoto, JoinedPhotos};
 use crate::io::scene_files::CHECKPOINT_FILE;
 use crate::io::{SceneFolder, files, trained};
-use crate::pipeline::observer::{Observer, Severity};
+use crate::pipeline::observer::{Interrupted, Observer, Severity};
 use crate::pipeline::train::checkpoint;
 use crate::render::BackendChoice;
 use crate::scene::Dataset;
 
 /// Folder of the list of photos in that of the scene.
 const PHOTOS: &str = "photos";
+/// Suffix of a scene with added photos.
+const CLOSER: &str = "closer";
 
 /// Choices for adding photos.
 #[derive(Clone, Debug, Default)]
@@ -71,6 +74,20 @@ pub(crate) struct AddedScene {
     pub(crate) new_identities: usize,
     pub(crate) steps: u64,
     pub(crate) secs: f64,
+}
+
+/// Adds photos to the scene in `folder` by the usual choices. The result is beside it, in the folder in which the same was
+/// begun, or in a new one.
+///
+/// # Errors
+/// As [`run`]; also if the observer stops it, which leaves what the same request goes on from.
+pub(crate) fn beside(folder: &Path, paths: &[PathBuf], observer: &mut dyn Observer) -> Result<AddedScene, JobError> {
+    let (scene, options) = (open::scene(folder)?, AddOptions::default());
+    let request = request(&scene, paths, &options);
+    let is_usable = |out: &Path| is_begun(&request, out) || out.is_dir() && !files::holds_something(out);
+    let out = derived::folder_beside(folder, CLOSER, is_usable);
+    let done = run(&scene, paths, &options, &out, observer)?;
+    if done.finished { Ok(done) } else { Err(Interrupted.into()) }
 }
 
 /// Adds the photos at `paths`, files or folders, to `scene`; the result is the scene in the folder `out`. A stopped run
@@ -221,7 +238,7 @@ fn keep(
     }
     let base = joined::list(&own.root).map_or_else(|_| own.source().into(), |list| own.root.join(list.photos));
     let list = JoinedPhotos {
-        name: derived::name(&scene.name, "closer", folder.parent().unwrap_or(folder)),
+        name: derived::name(&scene.name, CLOSER, folder.parent().unwrap_or(folder)),
         photos: files::real(&base),
         held_out: held.iter().map(|&i| own.photos[i].name.clone()).collect(),
         refined,

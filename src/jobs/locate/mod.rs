@@ -21,7 +21,7 @@ use crate::io::photo::{is_photo, is_unread};
 use crate::math::format;
 use crate::pipeline::locate::{FocalKnowledge, FoundPlace, Locator, PHOTO_PX, USUAL_PX};
 use crate::pipeline::observer::{Observer, Severity, Ticker};
-use crate::scene::{Camera, Dataset, Distortion, Photo, text};
+use crate::scene::{Camera, Dataset, Distortion, Photo, PhotoExposure, text};
 
 /// Largest longer side at which colors are aligned, px: photos are loaded no larger.
 pub(crate) const MOST_PX: u32 = PHOTO_PX;
@@ -84,6 +84,8 @@ pub(crate) struct PhotoPlace {
     pub(crate) agreeing: usize,
     /// Gain of its colors against the scene's, by channel.
     pub(crate) gain: [f32; 3],
+    /// Summand of its colors beside that gain, by channel.
+    pub(crate) bias: [f32; 3],
     /// Standard deviation of the center, scene units.
     pub(crate) center_deviation: Option<f64>,
     /// Standard deviation of the rotation, degrees.
@@ -104,6 +106,7 @@ impl PhotoPlace {
             correlation: found.correlation,
             agreeing: found.agreeing,
             gain: found.gain,
+            bias: found.bias,
             center_deviation: deviations.map(|d| d.0),
             rotation_deviation_deg: deviations.map(|d| d.1),
             covariance: found.covariance,
@@ -133,6 +136,13 @@ impl LocatedPhoto {
     pub(crate) fn posed(&self) -> Option<Photo> {
         let place = self.place.as_ref().filter(|_| self.located)?;
         Some(Photo { distortion: place.distortion, ..Photo::new(self.name(), &*self.photo, place.camera.clone()) })
+    }
+
+    /// Exposure of its colors beside the scene's; the usual one if nothing is known of it.
+    pub(crate) fn exposure(&self) -> PhotoExposure {
+        let of =
+            |place: &PhotoPlace| PhotoExposure { gain: place.gain.map(f64::from), bias: place.bias.map(f64::from) };
+        self.place.as_ref().map(of).unwrap_or_default()
     }
 
     /// Sentence on why it was not located.

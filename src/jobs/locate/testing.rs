@@ -53,6 +53,7 @@ pub(crate) fn found(path: &Path, camera: Camera) -> LocatedPhoto {
         correlation: 0.8,
         agreeing: 40,
         gain: [1.0; 3],
+        bias: [0.0; 3],
         center_deviation: Some(0.012),
         rotation_deviation_deg: Some(0.1),
         covariance: None,

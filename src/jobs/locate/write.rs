@@ -71,6 +71,7 @@ mod tests {
             correlation: 0.9,
             agreeing: 40,
             gain: [1.0; 3],
+            bias: [0.0; 3],
             center_deviation: None,
             rotation_deviation_deg: None,
             covariance: None,

@@ -118,6 +118,8 @@ pub(crate) struct FoundPlace {
     pub(crate) agreeing: usize,
     /// Gain of the photo's colors against the rendering's, by channel.
     pub(crate) gain: [f32; 3],
+    /// Summand of the photo's colors beside that gain, by channel.
+    pub(crate) bias: [f32; 3],
     /// Covariance of move (camera axes, scene units), turn (radians) and logarithm of the focal length; `None` where
     /// the photo does not determine the pose.
     pub(crate) covariance: Option<Curvature>,
@@ -218,6 +220,7 @@ impl Locator {
             correlation,
             agreeing,
             gain: aligned.exposure.gain,
+            bias: aligned.exposure.bias,
             covariance: covariance(&aligned.curvature, focal),
         })
     }

@@ -2,6 +2,7 @@
 //!
 //! An action changes the window at once, or starts a job and says what is done with its result ([`App::start`]).
 
+pub(super) mod add;
 pub(super) mod camera_path;
 pub(super) mod comparing;
 pub(super) mod edit;

@@ -50,7 +50,7 @@ pub(in crate::ui) fn open(app: &mut App, path: PathBuf) {
     // A scene beside this one, or made from it, is of the same place.
     let is_beside = app.state.beside.iter().any(|other| other.path == path);
     let is_made_of_it = app.state.removed.as_ref().is_some_and(|removed| removed.folder == path);
-    let is_kin = is_beside || is_made_of_it;
+    let is_kin = is_beside || is_made_of_it || app.state.closer.as_ref() == Some(&path);
     replace_scene(app, move |app| {
         let (workspace, title) = (Arc::clone(&app.workspace), format!("Opening {}", file_name(&path)));
         let info = JobInfo::urgent(title).makes(Makes::Scene);

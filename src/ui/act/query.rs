@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use egui::{Key, Modifiers};
 
-use super::{edits, locate, objects};
+use super::{add, edits, locate, objects};
 use crate::agent::scene::{AgentScene, Effect, ScenePhotos};
 use crate::jobs::edit::EditRequest;
 use crate::jobs::export;
@@ -225,6 +225,7 @@ pub(in crate::ui) fn effect(app: &mut App, effect: Effect) {
         }
         Effect::Undone(undone) => edits::queue(app, EditStep::UndoSentence(undone)),
         Effect::Located(found, differs) => locate::show(app, *found, differs),
+        Effect::AddPhotos(photos) => add::start(app, photos),
         Effect::Explored(explored) => app.state.explored = Some(explored),
     }
 }

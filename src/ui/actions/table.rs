@@ -235,6 +235,19 @@ macro_rules! action_table {
                     all => format!("Locate {} photos", all.len()),
                 },
                 "Find where they were taken, go there and compare them with the scene." => locate::start(app, paths);
+            AddFolder: "Add photos\u{2026}",
+                "Train a better scene from this one and a folder of new photos, with or without poses. This one stays as it is."
+                => add::choose_folder(app);
+            AddPhoto: "Add a photo\u{2026}",
+                "Train a better scene from this one and a new photo, or a list of posed ones. This one stays as it is."
+                => add::choose_photo(app);
+            AddPhotos(photos: Vec<PathBuf>): match photos.as_slice() {
+                    [one] => format!("Add {} to the scene", one.display()),
+                    all => format!("Add {} photos to the scene", all.len()),
+                },
+                "Train a better scene from this one and these photos. This one stays as it is." => add::start(app, photos);
+            OfferPhotos(folder: PathBuf): format!("Add or open {}", folder.display()),
+                "Add the folder's photos to the scene, or open it." => add::offer(app, folder);
             SavePose: "Save its pose\u{2026}",
                 "Write the camera of the located photo as a transforms.json beside it." => locate::save_pose(app);
             ForgetPhoto: "Remove the located photo",

@@ -1,5 +1,7 @@
 //! Drawing of the window: its bars, the view, the panes in their dock, and the dialogs over them.
 
+use std::path::Path;
+
 use egui::{CentralPanel, Frame, Margin, Panel, ScrollArea, Ui};
 
 use crate::jobs::locate::is_picture;
@@ -45,8 +47,15 @@ pub(super) fn panes(app: &mut App, ui: &mut Ui) {
 /// Dialogs and messages over everything.
 pub(super) fn over_everything(app: &mut App, ctx: &egui::Context) {
     if let Some(first) = ctx.input(|i| i.raw.hovered_files.first().cloned()) {
-        let is_photo = app.state.scene.is_some() && first.path.is_some_and(|path| is_picture(&path));
-        dialogs::drop_hint(ctx, if is_photo { "Drop to find where it was taken" } else { "Drop to open" });
+        let is_photo = |path: &Path| app.state.scene.is_some() && is_picture(path);
+        let hint = match &first.path {
+            Some(path) if is_photo(path) => "Drop to find where it was taken",
+            Some(path) if path.is_dir() && app.state.why_no_added_photos().is_none() => {
+                "Drop to add its photos to this scene, or to open it"
+            }
+            _ => "Drop to open",
+        };
+        dialogs::drop_hint(ctx, hint);
     }
     let selection = app.state.semantics.as_ref().zip(view::chosen_identity(app));
     let selection = selection.map(|(map, id)| {

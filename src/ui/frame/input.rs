@@ -60,6 +60,9 @@ pub(super) fn take(app: &mut App, ctx: &Context) {
             let photos = dropped.iter().filter(|path| is_picture(path)).cloned().collect();
             app.actions.push(Action::LocatePhotos(photos));
         }
+        [first, ..] if first.is_dir() && app.state.why_no_added_photos().is_none() => {
+            app.actions.push(Action::OfferPhotos(first.clone()));
+        }
         all => app.actions.extend(all.first().cloned().map(Action::Open)),
     }
 }

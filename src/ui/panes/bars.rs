@@ -2,7 +2,7 @@
 
 use std::time::{Duration, Instant};
 
-use egui::{Align, Button, Layout, RichText, Stroke, Ui, vec2};
+use egui::{Align, Button, Layout, Response, RichText, Stroke, Ui, vec2};
 use strum::VariantArray;
 
 use super::super::ctx::Ctx;
@@ -73,6 +73,11 @@ pub(crate) fn top(ui: &mut Ui, cx: &mut Ctx<'_>, view: &Viewport) {
             let is_result = state.scene.as_ref().is_some_and(|scene| scene.method.is_some());
             if is_result {
                 item(ui, true, None, Action::ChooseImport, cx);
+            }
+            let why = state.why_no_added_photos();
+            for action in [Action::AddFolder, Action::AddPhoto] {
+                let shown = entry(ui, why.is_none(), None, &action.text(), action, cx);
+                shown.on_disabled_hover_text(why.as_deref().unwrap_or_default());
             }
             item(ui, has_scene, None, Action::SaveCopy, cx);
             item(ui, has_scene, None, Action::ShowFolder(None), cx);
@@ -206,7 +211,7 @@ fn item(ui: &mut Ui, enabled: bool, on: Option<bool>, action: Action, cx: &mut C
     entry(ui, enabled, on, &text, action, cx);
 }
 
-fn entry(ui: &mut Ui, enabled: bool, on: Option<bool>, text: &str, action: Action, cx: &mut Ctx<'_>) {
+fn entry(ui: &mut Ui, enabled: bool, on: Option<bool>, text: &str, action: Action, cx: &mut Ctx<'_>) -> Response {
     // All entries of a menu with switches leave room for the check mark.
     let text = if on.is_some() { format!("{INDENT}{text}") } else { text.to_owned() };
     let button = Button::new(text).shortcut_text(keys::label(ui.ctx(), &action));
@@ -219,6 +224,7 @@ fn entry(ui: &mut Ui, enabled: bool, on: Option<bool>, text: &str, action: Actio
     if shown.clicked() {
         cx.ask(action);
     }
+    shown
 }
 
 /// Draws the bar at the bottom; returns the click on its message.
@@ -229,8 +235,8 @@ pub(crate) fn status(ui: &mut Ui, cx: &mut Ctx<'_>, picture: Option<&ViewPicture
             Some(job) => {
                 dot(ui, if job.paused { theme::warning() } else { theme::accent() });
                 // The training pane and the first page have their own buttons.
-                if !job.canceling && state.scene.is_some() && !(state.is_training() && cx.layout.shows(Pane::Training))
-                {
+                let is_in_pane = state.shown_training().is_some() && cx.layout.shows(Pane::Training);
+                if !job.canceling && state.scene.is_some() && !is_in_pane {
                     job_buttons(ui, job, cx);
                 }
                 ui.label(RichText::new(job.text()).strong());

@@ -3,7 +3,8 @@
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 
 use egui::{
-    Color32, ColorImage, Rect, RichText, ScrollArea, Sense, Stroke, TextureHandle, TextureOptions, Ui, pos2, vec2,
+    Button, Color32, ColorImage, Rect, RichText, ScrollArea, Sense, Stroke, TextureHandle, TextureOptions, Ui, pos2,
+    vec2,
 };
 
 use super::super::ctx::Ctx;
@@ -152,6 +153,14 @@ impl PaneContents for PhotosPane {
         facts(ui, dataset, dataset.photos.len() - test.len(), test.len());
         if scene.remote.as_ref().is_some_and(|origin| !origin.photos) {
             ui.weak("The photos are missing there; only their cameras are known.");
+        }
+        if state.is_trained() {
+            let why = state.why_no_added_photos();
+            let button = ui.add_enabled(why.is_none(), Button::new(Action::AddFolder.text()).small());
+            let button = button.on_hover_text(Action::AddFolder.tooltip());
+            if button.on_disabled_hover_text(why.unwrap_or_default()).clicked() {
+                cx.ask(Action::AddFolder);
+            }
         }
         self.runs.show(ui, cx);
         let scores: HashMap<&str, f64> = state

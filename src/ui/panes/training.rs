@@ -15,6 +15,7 @@ use crate::math::format;
 use crate::pipeline::train::TrainConfig;
 use crate::scene::{AlphaUse, text};
 use crate::ui::actions::Action;
+use crate::worker::Makes;
 
 /// The pane.
 #[derive(Default)]
@@ -34,7 +35,7 @@ impl PaneContents for TrainingPane {
             );
             return;
         };
-        let job = state.job.as_ref().filter(|_| state.is_training());
+        let job = state.shown_training();
         match job {
             Some(job) => running(ui, job, cx),
             None if scene.remote.is_some() => {
@@ -223,6 +224,9 @@ fn settings(ui: &mut Ui, config: &mut TrainConfig, largest_px: u32) {
 }
 
 fn running(ui: &mut Ui, job: &RunningJob, cx: &mut Ctx<'_>) {
+    if job.info.makes == Makes::SceneBeside {
+        ui.label(RichText::new(&job.info.title).color(theme::weak()));
+    }
     let done = job.fraction().unwrap_or(0.0);
     let text = job.progress.as_ref().map_or_else(
         || "starting".to_owned(),

@@ -59,6 +59,11 @@ impl LocatedPhotos {
         self.list.iter().position(|placed| placed.photo.path == path)
     }
 
+    /// Files of all photos, in their order.
+    pub(crate) fn files(&self) -> Vec<PathBuf> {
+        self.list.iter().map(|placed| placed.photo.path.clone()).collect()
+    }
+
     /// Number of photos.
     pub fn len(&self) -> usize {
         self.list.len()
@@ -124,6 +129,7 @@ mod tests {
             |state: &AppState| (0..5).map_while(|i| state.photo(i)).map(|p| p.title().into_owned()).collect::<Vec<_>>();
         assert_eq!((names(&state), state.photo_count()), (vec!["own.jpg".into(), "a.jpg".into(), "b.jpg".into()], 3));
         assert!(state.placed(0).is_none() && state.placed(1).is_some() && state.placed(3).is_none());
+        assert_eq!(state.located.files(), [PathBuf::from("/a.jpg"), "/b.jpg".into()]);
         assert!(state.located.remove(0).is_some() && state.located.remove(9).is_none());
         assert_eq!(names(&state), ["own.jpg", "b.jpg"]);
         state.opened(scene(), true);

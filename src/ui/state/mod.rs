@@ -29,6 +29,7 @@ use crate::scene::findings::IdentityEvidence;
 use crate::scene::{GaussianCloud, IdentityId, Limits, Overrides, SceneFacts, ScenePlan, SemanticMap, text};
 use crate::worker::{Event, JobEnd, JobId, JobInfo, JobLane, Makes, Versioned};
 
+mod adding;
 mod located;
 mod messages;
 mod running;
@@ -54,6 +55,8 @@ pub struct AppState {
     pub beside: Vec<ComparedScene>,
     /// The latest scene made by a removal.
     pub(crate) removed: Option<StoredRemoval>,
+    /// Folder of the latest scene that photos were added in.
+    pub(crate) closer: Option<PathBuf>,
     /// Counts the scenes shown so far; changes when `scene` does.
     pub(crate) scene_number: u64,
     /// Decisions on what is left out for the scene, with their reasons.
@@ -155,7 +158,7 @@ impl AppState {
             Event::Evaluation(job, evaluation) => self.evaluated_in_training(job, evaluation),
             Event::Note(_, Severity::Info, text) => self.say(Tone::Info, text),
             Event::Note(job, Severity::Warning, text) => {
-                if self.job.as_ref().is_some_and(|j| j.id == job && j.info.makes != Makes::Nothing) {
+                if self.job.as_ref().is_some_and(|j| j.id == job && j.info.makes.changes_scene()) {
                     self.problem(Some(job), &text);
                 }
                 self.say(Tone::Warning, text);
@@ -170,7 +173,7 @@ impl AppState {
         let long = self.job.take_if(|j| j.id == job);
         match end {
             JobEnd::Finished => {
-                if long.is_some_and(|j| j.info.makes != Makes::Nothing) {
+                if long.is_some_and(|j| j.info.makes.changes_scene()) {
                     // Problems of the scene before do not apply to the new one.
                     self.problems.retain(|(of, _)| *of == Some(job));
                 }
@@ -217,6 +220,11 @@ impl AppState {
     /// True if a training is running or paused.
     pub fn is_training(&self) -> bool {
         self.is_running(Makes::Gaussians)
+    }
+
+    /// The job that the Training pane shows: a training of the open scene, or of one beside it.
+    pub(crate) fn shown_training(&self) -> Option<&RunningJob> {
+        self.job.as_ref().filter(|job| job.info.makes.is_training())
     }
 
     /// True if a job that makes this is running or paused.
@@ -273,7 +281,7 @@ impl AppState {
             self.remember(scene.path.clone());
         }
         self.scene_number += 1;
-        (self.explored, self.removed) = (None, None);
+        (self.explored, self.removed, self.closer) = (None, None, None);
         self.beside.clear();
         self.located = LocatedPhotos::default();
         self.set_facts(scene.facts.clone());

@@ -65,6 +65,7 @@ impl RunningJob {
         match self.info.makes {
             Makes::Gaussians => "It is saved, and can be continued.",
             Makes::Objects => "It goes on where it was next time.",
+            Makes::SceneBeside => "It is saved, and goes on when the same photos are added again.",
             Makes::Scene | Makes::Nothing => "What it has done so far is discarded.",
         }
     }
@@ -137,6 +138,8 @@ mod tests {
     fn the_question_whether_to_stop_says_what_is_left() {
         let of = |makes| RunningJob::begun(JobId::Local(1), JobInfo::long("Exporting").makes(makes)).stop_question();
         assert_eq!(of(Makes::Gaussians), "Stop the training? It is saved, and can be continued.");
+        let beside = of(Makes::SceneBeside);
+        assert!(beside.starts_with("Stop \u{201c}Exporting\u{201d}?") && beside.contains("is saved"), "{beside}");
         let control = of(Makes::Nothing);
         assert!(control.starts_with("Stop \u{201c}Exporting\u{201d}?") && control.contains("discarded"), "{control}");
     }

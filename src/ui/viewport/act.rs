@@ -103,7 +103,8 @@ impl Viewport {
         let Some(scene) = &state.scene else { return };
         let Some(photo) = state.photo(index) else { return };
         self.eye = Eye::of_photo(&photo.camera, &scene.home, self.up(scene));
-        self.photo = Some(PhotoView::new(index, photo, state.placed(index).is_some(), tasks));
+        let located = state.placed(index).map(|placed| placed.found.exposure());
+        self.photo = Some(PhotoView::new(index, photo, located, tasks));
         self.moved_at = now;
     }
 

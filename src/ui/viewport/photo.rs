@@ -9,7 +9,7 @@ use egui::{
 };
 
 use super::eye::Eye;
-use crate::scene::{Camera, Photo, PhotoPixels};
+use crate::scene::{Camera, Photo, PhotoExposure, PhotoPixels};
 use crate::ui::theme;
 use crate::worker::{Task, Tasks, load_photo};
 
@@ -22,8 +22,8 @@ const SIDE_PX: u32 = 1600;
 /// A photo whose camera the view looks through.
 pub(super) struct PhotoView {
     index: usize,
-    /// True if it is none of the scene's own.
-    is_located: bool,
+    /// Exposure beside the scene's colors, if it was located; `None` for the scene's own photos.
+    located: Option<PhotoExposure>,
     photo: Photo,
     /// The job that loads the photo.
     task: Option<Task<PhotoPixels>>,
@@ -37,14 +37,14 @@ pub(super) struct PhotoView {
 }
 
 impl PhotoView {
-    /// Looks through the photo with this index; `is_located` tells that it is none of the scene's own.
-    pub(super) fn new(index: usize, photo: &Photo, is_located: bool, tasks: &Tasks) -> Self {
+    /// Looks through the photo with this index; `located` is the exposure of one that is none of the scene's own.
+    pub(super) fn new(index: usize, photo: &Photo, located: Option<PhotoExposure>, tasks: &Tasks) -> Self {
         // With a full queue there is no photo to compare with until the next visit.
-        let own = (!is_located).then_some(index);
+        let own = located.is_none().then_some(index);
         let task = if photo.has_pixels() { load_photo(tasks, own, photo, SIDE_PX).ok() } else { None };
         let failed = task.is_none();
         let photo = photo.clone();
-        Self { index, is_located, photo, task, pixels: None, texture: None, failed, margin: 1.0, came_from: None }
+        Self { index, located, photo, task, pixels: None, texture: None, failed, margin: 1.0, came_from: None }
     }
 
     pub(super) fn index(&self) -> usize {
@@ -52,7 +52,12 @@ impl PhotoView {
     }
 
     pub(super) fn is_located(&self) -> bool {
-        self.is_located
+        self.located.is_some()
+    }
+
+    /// Exposure beside the scene's colors: the usual one for the scene's own photos.
+    pub(super) fn exposure(&self) -> PhotoExposure {
+        self.located.unwrap_or_default()
     }
 
     pub(super) fn name(&self) -> Cow<'_, str> {

@@ -10,7 +10,10 @@ use crate::ui::state::PlacedPhoto;
 use crate::ui::{keys, theme};
 
 /// Letters of a photo's name; of a located one, which has more beside it.
-const LETTERS: [usize; 2] = [28, 20];
+const LETTERS: [usize; 2] = [28, 14];
+
+/// Text of the button that adds a located photo.
+const ADD: &str = "Add to scene";
 
 /// Draws the card's content. `psnr` is that of the frame against the photo.
 pub(super) fn show(ui: &mut Ui, photo: Option<&PhotoView>, psnr: Option<f64>, cx: &mut Ctx<'_>) {
@@ -48,7 +51,8 @@ pub(super) fn show(ui: &mut Ui, photo: Option<&PhotoView>, psnr: Option<f64>, cx
             cx.ask(Action::ToggleCompare);
         }
     }
-    if placed.is_some() {
+    if let Some(placed) = placed {
+        offer_to_add(ui, placed, cx);
         for (symbol, action) in [("Save pose\u{2026}", Action::SavePose), ("\u{d7}", Action::ForgetPhoto)] {
             let tip = format!("{}: {}", action.text(), action.tooltip());
             if ui.button(symbol).on_hover_text(tip).accessible_name(action.text()).clicked() {
@@ -56,6 +60,26 @@ pub(super) fn show(ui: &mut Ui, photo: Option<&PhotoView>, psnr: Option<f64>, cx
             }
         }
     }
+}
+
+/// Draws the button that adds the photo to the scene; of several located ones, one or all.
+fn offer_to_add(ui: &mut Ui, placed: &PlacedPhoto, cx: &mut Ctx<'_>) {
+    let (this, all) = (vec![placed.photo.path.clone()], cx.state.located.files());
+    let why = cx.state.why_no_added_photos();
+    let several = format!("All {} located photos", all.len());
+    let added = ui.add_enabled_ui(why.is_none(), |ui| {
+        if all.len() == 1 {
+            return ui.button(ADD).clicked().then_some(all);
+        }
+        let chosen = ui.menu_button(ADD, |ui| {
+            let this = ui.button("This photo").clicked().then_some(this);
+            this.or_else(|| ui.button(several).clicked().then_some(all))
+        });
+        chosen.inner.flatten()
+    });
+    let tip = Action::AddPhotos(Vec::new()).tooltip();
+    added.response.on_hover_text(tip).on_disabled_hover_text(why.unwrap_or_default());
+    added.inner.into_iter().for_each(|photos| cx.ask(Action::AddPhotos(photos)));
 }
 
 /// Draws a button to another photo.

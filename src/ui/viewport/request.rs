@@ -57,7 +57,7 @@ mod tests {
 
     use super::*;
     use crate::render::RenderSettings;
-    use crate::scene::{Camera, GaussianCloud, PhotoPixels};
+    use crate::scene::{Camera, GaussianCloud, PhotoExposure, PhotoPixels};
     use crate::worker::view::{QualityBudget, SkipPasses};
     use crate::worker::{Versioned, ViewMode};
 
@@ -75,6 +75,7 @@ mod tests {
                 settings: RenderSettings::default(),
                 budget: QualityBudget::Full,
                 photo: None,
+                exposure: PhotoExposure::default(),
                 semantics: None,
                 codes: false,
                 follow: false,

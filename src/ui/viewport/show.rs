@@ -340,6 +340,7 @@ impl Viewport {
             settings: self.overrides.over(state.render_settings(), self.on_gpu()),
             budget,
             photo: self.photo.as_ref().and_then(PhotoView::pixels),
+            exposure: self.photo.as_ref().map(PhotoView::exposure).unwrap_or_default(),
             codes: semantics.is_some() && self.queries.wants_codes(),
             follow: budget == QualityBudget::Moving
                 && (self.queries.tints() || self.picking.selected().is_some() || preview.is_some()),

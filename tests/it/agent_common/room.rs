@@ -323,6 +323,15 @@ impl World for Room {
         self.locate_photo(None, cancel)
     }
 
+    fn add_photos(&mut self, photos: Option<&str>) -> Result<String, WorldError> {
+        let name = photos.unwrap_or("photo.jpg").to_owned();
+        if name.contains("gone") {
+            return Err(WorldError(format!("there is no file '{name}'")));
+        }
+        self.log.push(format!("add_photos {name}"));
+        Ok(name)
+    }
+
     fn export_replaces(&self, id: IdentityId) -> Option<String> {
         self.exported[id as usize].then(|| format!("{}.ply", self.name(id)))
     }

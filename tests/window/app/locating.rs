@@ -55,6 +55,10 @@ fn a_picture_of_the_demo_is_located_in_it_and_stripes_are_not() {
     w.until("the photo", |a| a.viewport.photo_index() == Some(own));
     let away = w.app().viewport.pose().center.distance(picture.camera.center);
     assert!(away < 0.02 * picture.camera.center.length(), "{away}");
+    for button in ["Save its pose", "Add to scene"] {
+        assert!(w.shows(button), "{button}");
+    }
     w.ask(Action::ForgetPhoto);
+    assert!(!w.shows("Save its pose") && !w.shows("Add to scene"), "the control");
     assert!(w.app().state.located.is_empty() && w.app().viewport.photo_index().is_none());
 }

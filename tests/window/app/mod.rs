@@ -1,5 +1,6 @@
 //! The whole window, headless: the user's view and actions, with the software adapter.
 
+mod adding;
 mod appearance;
 mod comparing;
 mod crop;
