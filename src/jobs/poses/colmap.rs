@@ -8,7 +8,7 @@ use super::{DATABASE, ENOUGH, IMAGES, MakerStep, PoseWork, SNAPSHOTS, SPARSE, fi
 use crate::jobs::{JobError, export};
 use crate::pipeline::observer::Observer;
 
-/// Command of the incremental mapper, which is no one of GLOMAP.
+/// Way to map with the incremental mapper: its command, and whether GLOMAP runs it.
 const INCREMENTAL: (&str, bool) = ("mapper", false);
 /// Option for the folder of its snapshots.
 const SNAPSHOT_PATH: &str = "Mapper.snapshot_path";

@@ -193,10 +193,13 @@ fn bounds(cameras: &[Camera], cloud: Option<&GaussianCloud>) -> Option<Bounds> {
 
 #[cfg(test)]
 mod tests {
+    use std::time::Duration;
+
     use super::*;
     use crate::jobs::OpenedScene;
+    use crate::pipeline::observer::Observer;
     use crate::ui::viewport::eye::is_in_view;
-    use crate::worker::{Event, JobInfo};
+    use crate::worker::{Event, JobInfo, Stop};
 
     const JOB: JobId = JobId::Local(7);
 
@@ -244,7 +247,35 @@ mod tests {
     }
 
     #[test]
-    fn a_result_keeps_the_view_and_the_search_gives_it_back() {
+    fn the_view_is_lent_to_a_search_until_it_ends() {
+        for trained in [false, true] {
+            let tasks = Tasks::start(Arc::new(|| ())).expect("threads");
+            let mut viewport = Viewport::new(Arc::new(|| ())).expect("a thread");
+            let mut state = AppState::default();
+            state.scene = Some(Arc::new(OpenedScene { trained, ..OpenedScene::default() }));
+            let found = snapshot(1.0).found.clone();
+            let find = move |observer: &mut dyn Observer| {
+                observer.poses(found);
+                Ok::<_, Stop>(())
+            };
+            let _task = tasks.spawn(JobInfo::long("Finding camera poses"), find).expect("room");
+            let mut has_ended = false;
+            while !has_ended {
+                let event = tasks.wait_event(Duration::from_secs(20)).expect("the job ends");
+                has_ended = event.is_end();
+                if has_ended {
+                    viewport.update(&mut state, &tasks);
+                    assert_eq!(viewport.shows_growth(), !trained);
+                }
+                state.apply(event);
+            }
+            viewport.update(&mut state, &tasks);
+            assert!(!viewport.shows_growth());
+        }
+    }
+
+    #[test]
+    fn a_result_keeps_the_view() {
         let mut state = AppState::default();
         assert!(!may_show(&state, JOB), "nothing runs");
         state.apply(Event::Started(JOB, JobInfo::long("Finding camera poses")));
