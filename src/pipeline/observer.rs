@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 use serde::{Deserialize, Serialize};
 
 use crate::math::format;
-use crate::scene::GaussianCloud;
+use crate::scene::{Camera, GaussianCloud};
 pub use crate::scene::{Evaluation, StepMetrics, ViewScore};
 
 /// Signal to the work; queried at every step.
@@ -133,6 +133,17 @@ impl Progress {
     }
 }
 
+/// Cameras and points that a search for poses has found so far.
+#[derive(Clone, Debug, Default)]
+pub struct FoundSoFar {
+    /// Cameras of the photos with a pose.
+    pub(crate) cameras: Vec<Camera>,
+    /// Sparse points as Gaussians, if there are any.
+    pub(crate) cloud: Option<Arc<GaussianCloud>>,
+    /// Number of all photos.
+    pub(crate) photos: usize,
+}
+
 /// Severity of a line in the log.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 pub enum Severity {
@@ -172,6 +183,12 @@ pub trait Observer: Send {
     }
     /// Receives the present cloud.
     fn cloud(&mut self, _cloud: Arc<GaussianCloud>, _step: u64) {}
+    /// Returns whether poses are shown while they are sought. Snapshots of them cost time.
+    fn wants_poses(&self) -> bool {
+        false
+    }
+    /// Receives the poses that are known by now.
+    fn poses(&mut self, _found: FoundSoFar) {}
 }
 
 /// Observer that ignores all reports.

@@ -26,7 +26,7 @@ mod view_request;
 pub(crate) use control::Control;
 pub use event::Event;
 pub use failure::{Failure, Stop};
-pub(crate) use observer::{CloudSnapshot, Repaint};
+pub(crate) use observer::{CloudSnapshot, PosesSnapshot, Repaint};
 pub(crate) use photos::{RemotePhotos, load_photo};
 pub(crate) use slot::Slot;
 pub use slot::Versioned;

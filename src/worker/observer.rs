@@ -9,7 +9,7 @@ use crossbeam_channel::Sender;
 use super::event::Event;
 use super::task::JobId;
 use super::{Control, Slot};
-use crate::pipeline::observer::{Evaluation, Observer, Progress, Severity, Signal, StepMetrics};
+use crate::pipeline::observer::{Evaluation, FoundSoFar, Observer, Progress, Severity, Signal, StepMetrics};
 use crate::scene::GaussianCloud;
 
 /// Called after every event, from the worker's threads: asks the window to look.
@@ -25,6 +25,14 @@ pub struct CloudSnapshot {
     pub step: u64,
 }
 
+/// Poses found so far by a job.
+#[derive(Clone, Debug)]
+pub struct PosesSnapshot {
+    /// The search for poses.
+    pub(crate) job: JobId,
+    pub(crate) found: FoundSoFar,
+}
+
 /// Least time between two copies of the cloud: three a second keep the picture alive and cost
 /// training little.
 const CLOUD_EVERY: Duration = Duration::from_millis(320);
@@ -37,6 +45,7 @@ pub(super) struct JobObserver {
     pub(super) control: Arc<Control>,
     pub(super) events: Sender<Event>,
     pub(super) clouds: Arc<Slot<CloudSnapshot>>,
+    pub(super) poses: Arc<Slot<PosesSnapshot>>,
     pub(super) repaint: Repaint,
     pub(super) last_cloud: Option<Instant>,
     /// True if the job was last reported as paused.
@@ -94,6 +103,15 @@ impl Observer for JobObserver {
     fn cloud(&mut self, cloud: Arc<GaussianCloud>, step: u64) {
         self.last_cloud = Some(Instant::now());
         self.clouds.publish(CloudSnapshot { job: self.job, cloud, step });
+        (self.repaint)();
+    }
+
+    fn wants_poses(&self) -> bool {
+        true
+    }
+
+    fn poses(&mut self, found: FoundSoFar) {
+        self.poses.publish(PosesSnapshot { job: self.job, found });
         (self.repaint)();
     }
 }

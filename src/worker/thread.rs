@@ -12,7 +12,7 @@ use crossbeam_channel::{Receiver, Sender, bounded};
 
 use super::event::Event;
 use super::failure::{Failure, Stop};
-use super::observer::{CloudSnapshot, JobObserver, Repaint};
+use super::observer::{CloudSnapshot, JobObserver, PosesSnapshot, Repaint};
 use super::task::{JobEnd, JobId, JobInfo, JobLane, Task};
 use super::{Control, RemotePhotos, Slot};
 use crate::pipeline::observer::{Observer, Signal};
@@ -51,6 +51,7 @@ pub struct Tasks {
     short: Option<Sender<Queued>>,
     events: Option<Receiver<Event>>,
     clouds: Arc<Slot<CloudSnapshot>>,
+    poses: Arc<Slot<PosesSnapshot>>,
     repaint: Repaint,
     remote_photos: Option<RemotePhotos>,
     controls: Controls,
@@ -64,17 +65,17 @@ impl Tasks {
     /// Starts the threads. Fails only if the system gives none.
     pub fn start(repaint: Repaint) -> std::io::Result<Self> {
         let (event_sender, events) = bounded(EVENTS);
-        let clouds = Arc::new(Slot::default());
+        let (clouds, poses) = (Arc::new(Slot::default()), Arc::new(Slot::default()));
         let controls = Controls::default();
         let mut threads = Vec::new();
         let mut lane = |name: &str, pool: Option<rayon::ThreadPool>| {
             let (sender, queue) = bounded::<Queued>(QUEUED);
-            let (events, clouds, controls, repaint) =
-                (event_sender.clone(), Arc::clone(&clouds), Arc::clone(&controls), repaint.clone());
+            let (events, controls, repaint) = (event_sender.clone(), Arc::clone(&controls), repaint.clone());
+            let slots = (Arc::clone(&clouds), Arc::clone(&poses));
             let work = move || {
                 for queued in queue {
                     let yields = queued.info.lane == JobLane::Long;
-                    let run = || run_one(queued, &events, &clouds, &controls, &repaint);
+                    let run = || run_one(queued, &events, &slots, &controls, &repaint);
                     match &pool {
                         Some(pool) if yields => pool.install(run),
                         _ => run(),
@@ -91,6 +92,7 @@ impl Tasks {
             short,
             events,
             clouds,
+            poses,
             repaint,
             remote_photos: None,
             controls,
@@ -174,7 +176,12 @@ impl Tasks {
         &self.clouds
     }
 
-    /// The same slot, for a training on another computer.
+    /// Slot in which poses are published while they are sought.
+    pub(crate) fn poses(&self) -> &Slot<PosesSnapshot> {
+        &self.poses
+    }
+
+    /// The slot of Gaussians in training, for a training on another computer.
     pub(crate) fn shared_clouds(&self) -> Arc<Slot<CloudSnapshot>> {
         Arc::clone(&self.clouds)
     }
@@ -217,7 +224,7 @@ fn lock(controls: &Controls) -> MutexGuard<'_, HashMap<JobId, Arc<Control>>> {
 fn run_one(
     queued: Queued,
     events: &Sender<Event>,
-    clouds: &Arc<Slot<CloudSnapshot>>,
+    (clouds, poses): &(Arc<Slot<CloudSnapshot>>, Arc<Slot<PosesSnapshot>>),
     controls: &Controls,
     repaint: &Repaint,
 ) {
@@ -227,6 +234,7 @@ fn run_one(
         control,
         events: events.clone(),
         clouds: Arc::clone(clouds),
+        poses: Arc::clone(poses),
         repaint: repaint.clone(),
         last_cloud: None,
         paused: AtomicBool::new(false),
@@ -254,4 +262,27 @@ pub(super) fn panic_failure(payload: &(dyn Any + Send)) -> Failure {
         .unwrap_or_else(|| "no message".into());
     let remedy = "The scene on screen is unharmed. Please report this with the log.";
     Failure::new(format!("Internal error: {text}"), remedy)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::pipeline::observer::FoundSoFar;
+
+    #[test]
+    fn the_newest_poses_are_kept_with_their_search() {
+        let tasks = Tasks::start(Arc::new(|| ())).expect("threads");
+        let find = |observer: &mut dyn Observer| {
+            for photos in [2, 3] {
+                observer.poses(FoundSoFar { photos, ..FoundSoFar::default() });
+            }
+            Ok::<_, Stop>(observer.wants_poses())
+        };
+        assert!(tasks.poses().newer_than(0).is_none());
+        let task = tasks.spawn(JobInfo::long("Finding camera poses"), find).expect("room");
+        while !tasks.wait_event(Duration::from_secs(20)).expect("the job ends").is_end() {}
+        assert_eq!(task.poll(), Some(Ok(true)));
+        let (generation, snapshot) = tasks.poses().newer_than(0).expect("poses");
+        assert_eq!((generation, snapshot.job, snapshot.found.photos), (2, task.job(), 3));
+    }
 }

@@ -4,9 +4,14 @@ use std::path::{Path, PathBuf};
 
 use super::maker::{MakerKind, MakerPlaces, PoseMaker};
 use super::process::{self, PoseStage};
-use super::{DATABASE, ENOUGH, IMAGES, MakerStep, PoseWork, SPARSE, findings::registered};
+use super::{DATABASE, ENOUGH, IMAGES, MakerStep, PoseWork, SNAPSHOTS, SPARSE, findings::registered};
 use crate::jobs::{JobError, export};
 use crate::pipeline::observer::Observer;
+
+/// Way to map with the incremental mapper: its command, and whether GLOMAP runs it.
+const INCREMENTAL: (&str, bool) = ("mapper", false);
+/// Option for the folder of its snapshots.
+const SNAPSHOT_PATH: &str = "Mapper.snapshot_path";
 
 /// Programs of COLMAP.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -42,7 +47,7 @@ impl Colmap {
     }
 
     fn stage(&self, step: MakerStep, args: Vec<String>) -> PoseStage {
-        PoseStage { title: step.title(), program: self.colmap.clone(), args }
+        PoseStage { title: step.title(), program: self.colmap.clone(), args, snapshots: None }
     }
 
     /// Command that finds features, or matches them.
@@ -82,12 +87,25 @@ impl Colmap {
         stage
     }
 
+    /// Lets COLMAP's incremental mapper write snapshots, if this version does.
+    fn add_snapshots(&self, stage: &mut PoseStage, work: &PoseWork<'_>) -> Result<(), JobError> {
+        let Some(frequency) = snapshot_frequency(&process::output(&self.colmap, &["mapper", "-h"])) else {
+            return Ok(());
+        };
+        let folder = work.at(SNAPSHOTS);
+        export::make_folder(&folder)?;
+        let pairs = [(SNAPSHOT_PATH, text(&folder)), (frequency, work.photos_per_snapshot().to_string())];
+        stage.args.extend(options(&pairs));
+        stage.snapshots = Some(folder);
+        Ok(())
+    }
+
     /// Ways to map, the better one for these photos first.
     fn ways(&self, general: &str, work: &PoseWork<'_>) -> Vec<(&'static str, bool)> {
         let has_global = general.split_whitespace().any(|word| word == "global_mapper");
         let global =
             if has_global { Some(("global_mapper", false)) } else { self.glomap.as_ref().map(|_| ("mapper", true)) };
-        let mut ways: Vec<_> = std::iter::once(("mapper", false)).chain(global).collect();
+        let mut ways: Vec<_> = std::iter::once(INCREMENTAL).chain(global).collect();
         if work.maps_globally() {
             ways.reverse();
         }
@@ -101,7 +119,11 @@ impl Colmap {
         for (command, with_glomap) in self.ways(general, work) {
             super::remove(&beside)?;
             export::make_folder(&beside)?;
-            match process::run(&self.mapping(command, with_glomap, work, &beside), work.photos.len(), observer) {
+            let mut stage = self.mapping(command, with_glomap, work, &beside);
+            if observer.wants_poses() && (command, with_glomap) == INCREMENTAL {
+                self.add_snapshots(&mut stage, work)?;
+            }
+            match process::run(&stage, work.photos.len(), observer) {
                 Err(e) if e.is_cancelled() => return Err(e),
                 Err(e) => failed = failed.or(Some(e)),
                 Ok(()) if registered(&beside) > registered(&work.sparse) => {
@@ -161,8 +183,18 @@ fn text(path: &Path) -> String {
 }
 
 fn args(command: &str, pairs: &[(&str, String)]) -> Vec<String> {
-    let options = pairs.iter().flat_map(|(name, value)| [format!("--{name}"), value.clone()]);
-    std::iter::once(command.to_owned()).chain(options).collect()
+    std::iter::once(command.to_owned()).chain(options(pairs)).collect()
+}
+
+fn options(pairs: &[(&str, String)]) -> impl Iterator<Item = String> {
+    pairs.iter().flat_map(|(name, value)| [format!("--{name}"), value.clone()])
+}
+
+/// Option for the number of photos between two snapshots, by the mapper's help text; its name depends on the version.
+fn snapshot_frequency(help: &str) -> Option<&'static str> {
+    let has = |name: &str| help.contains(&format!("--{name}"));
+    let names = ["Mapper.snapshot_frames_freq", "Mapper.snapshot_images_freq"];
+    names.into_iter().find(|name| has(name)).filter(|_| has(SNAPSHOT_PATH))
 }
 
 #[cfg(test)]
@@ -177,10 +209,24 @@ mod tests {
             let work = PoseWork { out: Path::new(""), photos: &names, one_camera: false, is_video: false, sparse };
             tools.ways(general, &work)
         };
-        let [one_by_one, globally, glomap] = [("mapper", false), ("global_mapper", false), ("mapper", true)];
+        let [one_by_one, globally, glomap] = [INCREMENTAL, ("global_mapper", false), ("mapper", true)];
         assert_eq!(ways(150, "global_mapper", None), [one_by_one, globally]);
         assert_eq!(ways(151, "global_mapper", Some("glomap")), [globally, one_by_one]);
         assert_eq!(ways(151, "", Some("glomap")), [glomap, one_by_one]);
         assert_eq!(ways(151, "", None), [one_by_one]);
+    }
+
+    #[test]
+    fn snapshots_are_asked_for_by_the_name_of_the_version_or_not_at_all() {
+        let [path, new, old] = [
+            "--Mapper.snapshot_path arg",
+            "--Mapper.snapshot_frames_freq arg (=0)",
+            "--Mapper.snapshot_images_freq arg",
+        ];
+        assert_eq!(snapshot_frequency(&format!("{path}\n  {new}")), Some("Mapper.snapshot_frames_freq"));
+        assert_eq!(snapshot_frequency(&format!("{old}\n  {path}")), Some("Mapper.snapshot_images_freq"));
+        for help in ["", path, new, old, "--Mapper.fix_existing_frames arg (=0)"] {
+            assert_eq!(snapshot_frequency(help), None, "{help}");
+        }
     }
 }

@@ -16,6 +16,7 @@ mod makers;
 pub(crate) mod manual;
 mod process;
 mod pycolmap;
+mod snapshots;
 pub(crate) mod source;
 mod state;
 #[cfg(test)]
@@ -40,6 +41,8 @@ const SPARSE: &str = "sparse";
 const IMAGES: &str = "images";
 /// Database of COLMAP in the folder of poses.
 const DATABASE: &str = "database.db";
+/// Folder of snapshots in the folder of poses, while a maker maps.
+const SNAPSHOTS: &str = "snapshots";
 /// Share of the photos with a pose, below which a maker tries its next way to map.
 const ENOUGH: f64 = 0.8;
 
@@ -85,6 +88,13 @@ impl PoseWork<'_> {
         self.out.join(name)
     }
 
+    /// Number of photos between two snapshots, which cost time.
+    fn photos_per_snapshot(&self) -> usize {
+        /// Snapshots of a search.
+        const ALL: usize = 50;
+        self.photos.len().div_ceil(ALL).max(1)
+    }
+
     /// True if neighbors in the list are matched only, not all pairs.
     fn is_sequential(&self) -> bool {
         /// Photos up to which all pairs of a video are matched, so that it may come back to where it was.
@@ -119,7 +129,7 @@ pub(crate) fn find(
         return Ok(found);
     }
     let one_camera = gather(photos, out, observer)?;
-    let (sparse, part) = (out.join(SPARSE), out.join("sparse.part"));
+    let (sparse, part, snapshots) = (out.join(SPARSE), out.join("sparse.part"), out.join(SNAPSHOTS));
     let work =
         PoseWork { out, photos: &photos.photos, one_camera, is_video: photos.video.is_some(), sparse: part.clone() };
     for &step in maker.steps() {
@@ -128,9 +138,14 @@ pub(crate) fn find(
         }
         if step == MakerStep::Mapping {
             remove(&part)?;
+            // Of a search that was killed.
+            remove(&snapshots)?;
             export::make_folder(&part)?;
         }
-        maker.run(step, &work, observer)?;
+        let done = maker.run(step, &work, observer);
+        let cleared = remove(&snapshots);
+        done?;
+        cleared?;
         if step == MakerStep::Mapping {
             largest_first(&part)?;
             if !io::colmap::is_colmap(&part) {

@@ -10,6 +10,7 @@ use std::time::Duration;
 
 use crossbeam_channel::{RecvTimeoutError, Sender, bounded};
 
+use super::snapshots::Snapshots;
 use crate::jobs::JobError;
 use crate::pipeline::observer::{Observer, Ticker};
 
@@ -27,6 +28,8 @@ pub(super) struct PoseStage {
     pub(super) title: &'static str,
     pub(super) program: PathBuf,
     pub(super) args: Vec<String>,
+    /// Folder in which it writes snapshots of the poses, if it does.
+    pub(super) snapshots: Option<PathBuf>,
 }
 
 /// A running program, killed when this is dropped.
@@ -77,9 +80,11 @@ pub(super) fn run(stage: &PoseStage, photos: usize, observer: &mut dyn Observer)
     drop(sender);
     let mut ticker = Ticker::new(stage.title, photos);
     let mut registered = 0;
+    let mut snapshots = stage.snapshots.clone().map(|folder| Snapshots::new(folder, photos));
     ticker.report(0, observer);
     loop {
         ticker.proceed(observer)?;
+        snapshots.iter_mut().for_each(|snapshots| snapshots.look(observer));
         match lines.recv_timeout(PATIENCE) {
             Ok(line) => {
                 if let Some(done) = progress(&line, photos, &mut registered) {

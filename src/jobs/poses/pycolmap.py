@@ -3,7 +3,7 @@
 import os
 import sys
 
-step, out, sparse, one_camera, sequential, enough, globally = sys.argv[1:8]
+step, out, sparse, one_camera, sequential, enough, globally, snapshots, every = sys.argv[1:10]
 import pycolmap
 
 database = os.path.join(out, "database.db")
@@ -12,6 +12,20 @@ images = os.path.join(out, "images")
 
 def registered(models):
     return max((model.num_reg_images() for model in models.values()), default=0)
+
+
+def with_snapshots():
+    """Arguments that let the incremental mapper write snapshots, as far as this version does."""
+    options = getattr(pycolmap, "IncrementalPipelineOptions", None)
+    options = options and options()
+    names = ("snapshot_frames_freq", "snapshot_images_freq")
+    frequency = next((name for name in names if hasattr(options, name)), None)
+    if not snapshots or frequency is None or not hasattr(options, "snapshot_path"):
+        return {}
+    os.makedirs(snapshots, exist_ok=True)
+    options.snapshot_path = snapshots
+    setattr(options, frequency, int(every))
+    return {"options": options}
 
 
 if step == "features":
@@ -35,7 +49,7 @@ elif step == "mapping":
         # The largest one becomes `0` afterwards.
         beside = os.path.join(sparse, "incremental")
         os.makedirs(beside, exist_ok=True)
-        models = pycolmap.incremental_mapping(database, images, beside)
+        models = pycolmap.incremental_mapping(database, images, beside, **with_snapshots())
         for number in models:
             os.rename(os.path.join(beside, str(number)), os.path.join(sparse, "incremental-%s" % number))
         os.rmdir(beside)

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use super::maker::{MakerKind, MakerPlaces, PoseMaker};
 use super::process::{self, PoseStage};
-use super::{ENOUGH, MakerStep, PoseWork, environment};
+use super::{ENOUGH, MakerStep, PoseWork, SNAPSHOTS, environment};
 use crate::jobs::JobError;
 use crate::pipeline::observer::Observer;
 
@@ -53,6 +53,7 @@ impl PoseMaker for Pycolmap {
         };
         let path = |path: &std::path::Path| path.to_string_lossy().into_owned();
         let enough = (ENOUGH * work.photos.len() as f64).ceil() as usize;
+        let snapshots = (step == MakerStep::Mapping && observer.wants_poses()).then(|| work.at(SNAPSHOTS));
         let args = vec![
             "-u".into(),
             "-c".into(),
@@ -64,8 +65,10 @@ impl PoseMaker for Pycolmap {
             flag(work.is_sequential()),
             enough.to_string(),
             flag(work.maps_globally()),
+            snapshots.as_deref().map_or_else(String::new, path),
+            work.photos_per_snapshot().to_string(),
         ];
-        let stage = PoseStage { title: step.title(), program: self.python.clone(), args };
+        let stage = PoseStage { title: step.title(), program: self.python.clone(), args, snapshots };
         process::run(&stage, work.photos.len(), observer)
     }
 }

@@ -30,7 +30,7 @@ pub(super) fn panes(app: &mut App, ui: &mut Ui) {
         let (mut cx, viewport) = app.context();
         Panel::top("menus").frame(bar).show(ui, |ui| bars::top(ui, &mut cx, viewport));
         let status = Panel::bottom("status").frame(bar);
-        let clicked = status.show(ui, |ui| bars::status(ui, &mut cx, viewport.picture())).inner;
+        let clicked = status.show(ui, |ui| bars::status(ui, &mut cx, viewport)).inner;
         message_clicked(app, clicked);
     }
     problems::show(ui, &mut app.state);
@@ -114,9 +114,10 @@ fn show_view(app: &mut App, ui: &mut Ui) {
     let route = layout.shows(Pane::Camera).then(|| camera.route(viewport.pose().center));
     let has_scene = state.scene.is_some();
     let mut cx = Ctx { state, layout, tasks, thumbnails, actions };
-    match has_scene {
-        true => theme::dark(ui, |ui| viewport.show(ui, &mut cx, route.as_ref())),
-        false => first_page.show(ui, &mut cx),
+    match (viewport.shows_growth(), has_scene) {
+        (true, _) => theme::dark(ui, |ui| viewport.show_growth(ui, &cx)),
+        (false, true) => theme::dark(ui, |ui| viewport.show(ui, &mut cx, route.as_ref())),
+        (false, false) => first_page.show(ui, &mut cx),
     }
     let Some(why) = vain else { return };
     match has_scene {

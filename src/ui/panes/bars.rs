@@ -16,7 +16,6 @@ use crate::scene::{NO_IDENTITY, text};
 use crate::ui::actions::{Action, Axis, Face, Pane, THEMES};
 use crate::ui::select_shape::SelectShape;
 use crate::worker::ViewMode;
-use crate::worker::view::ViewPicture;
 
 /// Indent of entries in a menu with switches.
 const INDENT: &str = "     ";
@@ -228,21 +227,22 @@ fn entry(ui: &mut Ui, enabled: bool, on: Option<bool>, text: &str, action: Actio
 }
 
 /// Draws the bar at the bottom; returns the click on its message.
-pub(crate) fn status(ui: &mut Ui, cx: &mut Ctx<'_>, picture: Option<&ViewPicture>) -> Option<ToastClick> {
+pub(crate) fn status(ui: &mut Ui, cx: &mut Ctx<'_>, view: &Viewport) -> Option<ToastClick> {
     let (state, mut clicked) = (cx.state, None);
+    let has_view = state.scene.is_some() || view.shows_growth();
     ui.horizontal(|ui| {
         match &state.job {
             Some(job) => {
                 dot(ui, if job.paused { theme::warning() } else { theme::accent() });
                 // The training pane and the first page have their own buttons.
                 let is_in_pane = state.shown_training().is_some() && cx.layout.shows(Pane::Training);
-                if !job.canceling && state.scene.is_some() && !is_in_pane {
+                if !job.canceling && has_view && !is_in_pane {
                     job_buttons(ui, job, cx);
                 }
                 ui.label(RichText::new(job.text()).strong());
                 // A message goes first where there is no room for both.
                 let has_room = state.toasts.is_empty() || ui.available_width() > CROWDED_PT;
-                let shown = has_room && state.scene.is_some() && !job.canceling;
+                let shown = has_room && has_view && !job.canceling;
                 if job.progress.is_some() && shown {
                     progress(ui, job);
                 }
@@ -262,7 +262,7 @@ pub(crate) fn status(ui: &mut Ui, cx: &mut Ctx<'_>, picture: Option<&ViewPicture
             if log.on_hover_text("Show or hide the log").clicked() {
                 cx.ask(Action::TogglePane(Pane::Log));
             }
-            if let Some(p) = picture.filter(|_| ui.available_width() > DRAWN_BY_PT) {
+            if let Some(p) = view.picture().filter(|_| ui.available_width() > DRAWN_BY_PT) {
                 let text = RichText::new(format!("Rendered on {}", p.drawn_by)).small();
                 match &p.instead_of_gpu {
                     Some(why) => ui.label(text.color(theme::warning())).on_hover_text(why),

@@ -13,13 +13,18 @@ const REACH: f32 = 12.0;
 /// Number of cameras that are drawn, the nearest ones. All of them would hide the scene.
 const MOST: usize = 10;
 
+/// Size of a camera in a scene of this radius.
+pub(super) fn size_in(radius: f64) -> f64 {
+    0.09 * radius
+}
+
 /// Draws the nearest cameras into the view in `rect`, which `eye` sees; a click on one looks through it. Returns true if the
 /// cursor is on one.
 pub(super) fn show(ui: &Ui, rect: Rect, eye: &Camera, response: &Response, cx: &mut Ctx<'_>) -> bool {
     let state = cx.state;
     let Some(scene) = &state.scene else { return false };
     let painter = ui.painter_at(rect);
-    let size = 0.09 * scene.home.bounds.radius();
+    let size = size_in(scene.home.bounds.radius());
     let held_out: std::collections::HashSet<usize> =
         scene.held_out(cx.layout.config.holdout_every).into_iter().collect();
     let cursor = response.hover_pos().filter(|pos| rect.contains(*pos));
@@ -59,6 +64,14 @@ pub(super) fn show(ui: &Ui, rect: Rect, eye: &Camera, response: &Response, cx: &
         }
     }
     nearest.is_some()
+}
+
+/// Draws all of these cameras, each of this size.
+pub(super) fn show_all(ui: &Ui, rect: Rect, eye: &Camera, cameras: &[Camera], size: f64) {
+    let painter = ui.painter_at(rect);
+    let place = |p: DVec2| rect.min + egui::vec2(p.x as f32, p.y as f32);
+    let stroke = Stroke::new(1.0, Color32::from_white_alpha(150));
+    cameras.iter().for_each(|camera| draw(&painter, eye, camera, size, place, stroke));
 }
 
 fn label(painter: &Painter, at: Pos2, text: &str) {

@@ -7,6 +7,7 @@ mod display;
 pub mod eye;
 pub(crate) mod frame_times;
 mod frusta;
+mod growing;
 mod input;
 mod legend;
 mod marks;
@@ -35,6 +36,7 @@ use glam::DVec3;
 use self::compared::Compared;
 use self::display::Display;
 use self::eye::Eye;
+use self::growing::GrowingView;
 use self::input::Steering;
 use self::marks::Marks;
 use self::overrides::RenderOverrides;
@@ -93,6 +95,8 @@ pub struct Viewport {
     preparation: SelectionPreparation,
     /// Render settings in place of the scene's own.
     pub overrides: RenderOverrides,
+    /// Poses that are being found.
+    growing: GrowingView,
 }
 
 impl Viewport {
@@ -122,6 +126,7 @@ impl Viewport {
             tool: None,
             preparation: SelectionPreparation::default(),
             overrides: RenderOverrides::default(),
+            growing: GrowingView::default(),
         })
     }
 
@@ -225,6 +230,7 @@ impl Viewport {
 
     /// Takes over a new scene, new Gaussians, and the results of the viewport's own jobs; begins their next steps.
     pub(crate) fn update(&mut self, state: &mut AppState, tasks: &Tasks) {
+        self.follow_growth(state, tasks);
         if let Some(scene) = state.scene.as_ref().filter(|_| state.scene_number != self.scene) {
             self.scene = state.scene_number;
             let keeps_place = std::mem::take(&mut self.keeps_place);

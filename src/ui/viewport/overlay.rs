@@ -37,7 +37,7 @@ const NARROW_BESIDE_FACTS: f32 = 760.0;
 const LOW: f32 = 330.0;
 
 /// Draws a card over a view, moved down by `down` points.
-fn card(
+pub(super) fn card(
     ui: &Ui,
     rect: Rect,
     name: impl std::hash::Hash + std::fmt::Debug,

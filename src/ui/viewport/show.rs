@@ -27,9 +27,9 @@ use crate::worker::ViewMode;
 use crate::worker::view::{QualityBudget, SkipPasses, ViewRequest};
 
 /// Rest after which the camera no longer counts as moving, s.
-const REST_SECS: f64 = 0.15;
+pub(super) const REST_SECS: f64 = 0.15;
 /// Longest side of a frame, px: more would add delay but no visible detail.
-const MAX_SIDE_PX: u32 = 1600;
+pub(super) const MAX_SIDE_PX: u32 = 1600;
 
 impl Viewport {
     /// Draws the viewport into the rest of `ui`.
