@@ -18,7 +18,7 @@ use crate::math::format;
 use crate::pipeline::observer::FoundSoFar;
 use crate::pipeline::train::TrainConfig;
 use crate::render::RenderSettings;
-use crate::scene::{Bounds, Camera, GaussianCloud, HomeView};
+use crate::scene::{Bounds, Camera, GaussianCloud, HomeView, PhotoExposure};
 use crate::ui::ctx::Ctx;
 use crate::ui::state::AppState;
 use crate::worker::view::{QualityBudget, SkipPasses, ViewRequest};
@@ -112,6 +112,7 @@ impl GrownPoses {
             settings: self.settings.clone(),
             budget: if rests < 0.0 { QualityBudget::Moving } else { QualityBudget::Shared },
             photo: None,
+            exposure: PhotoExposure::default(),
             semantics: None,
             follow: false,
             codes: false,
