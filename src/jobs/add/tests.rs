@@ -118,7 +118,7 @@ fn close_ups_refine_what_they_show_and_the_scene_stays() {
     let whole = open::scene(&at("whole")).expect("a scene");
     let known = run(&whole, &[at("near")], &options, &at("known"), &mut Silent).expect_err("known").to_string();
     assert!(known.contains("no photo is left to add"), "{known}");
-    photos(&at("nearer"), &[camera(0.1, 1.4), camera(-0.2, 1.4)], &[]);
+    photos(&at("nearer"), &[camera(0.1, 1.0), camera(-0.2, 1.0)], &[]);
     let again = run(&whole, &[at("nearer")], &options, &at("again"), &mut Silent).expect("added again");
     assert_eq!((again.trained, again.unchanged, again.held_out_scores.map(|s| s.photos)), (2, true, Some(2)));
     let list = joined::list(&at("again").join(PHOTOS)).expect("a list");

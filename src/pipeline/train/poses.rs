@@ -6,7 +6,8 @@
 //! moves and turns, which look alike in a picture, for one another. There is no state but the six numbers.
 //!
 //! A prior holds each pose to the given one: [`MOVE_DEVIATION`] and [`TURN_DEVIATION`] are what a pose is expected to be
-//! off by. What no photo can tell, a move, turn and change of size of everything, is taken out after each step
+//! off by. Changes far smaller than that in all photos are given back: the scene is never at rest, and would take right
+//! poses with it. What no photo can tell, a move, turn and change of size of everything, is taken out after each step
 //! ([`PoseGauge`]), unless some poses are held, which then hold the others.
 
 use std::ops::Range;

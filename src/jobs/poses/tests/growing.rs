@@ -61,7 +61,8 @@ fn colmap(help: &str, first: &str) -> Fake {
     let (here, program) = (fake.guard.path(), fake.guard.path().join("colmap"));
     let script = fs::read_to_string(&program).expect("read");
     let first = first.replace("SNAPSHOT", "\"$9\"/0001").replace("HERE", &here.display().to_string());
-    let mapper = format!("  [ \"$2\" = \"-h\" ] && {{ echo '{help}'; exit 0; }}\n  if [ $# -gt 8 ]; then\n{first}fi\n");
+    let mapper =
+        format!("  [ \"$2\" = \"-h\" ] && {{ echo '{help}'; exit 0; }}\n  if [ $# -gt 8 ]; then\n  true\n{first}fi\n");
     let new = script.replace("  [ \"$2\" = \"-h\" ] && exit 0\n", &mapper);
     assert_ne!(new, script);
     fs::write(here.join("points.bin"), points()).and_then(|()| fs::write(&program, new)).expect("written");
