@@ -237,7 +237,7 @@ mod tests {
             refiner.offsets[1]
         };
         let off = |found: PoseOffset| found.along.distance(offset.along) + found.turn.distance(offset.turn);
-        assert!(off(run(1.0, 1e-9)) < 0.02 * offset.along.length(), "{:?}", run(1.0, 1e-9));
+        assert!(off(run(1.0, 1e-9)) < 0.03 * offset.along.length(), "{:?}", run(1.0, 1e-9));
         let held = run(1.0, 1e-2);
         assert!(held.along.length() < 0.6 * offset.along.length(), "the prior holds it: {held:?}");
         assert_eq!(run(0.0, 1e-9), PoseOffset::default(), "zeroed gradients move nothing");
