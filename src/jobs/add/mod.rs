@@ -200,7 +200,13 @@ fn check(scene: &Scene, folder: &Path, request: &serde_json::Value, out: &Path) 
         let text = format!("{} is the scene itself, which stays; choose a new folder", out.display());
         return Err(JobError::Output(text));
     }
-    if is_begun(request, out) { Ok(()) } else { derived::check(out) }
+    if is_begun(request, out) || is_bare(out) { Ok(()) } else { derived::check(out) }
+}
+
+/// Returns whether a folder holds nothing but a place for photos without a list, as after a kill at the begin.
+fn is_bare(out: &Path) -> bool {
+    let is_alone = std::fs::read_dir(out).is_ok_and(|all| all.flatten().all(|entry| entry.file_name() == PHOTOS));
+    is_alone && !files::holds_something(&out.join(PHOTOS))
 }
 
 /// Removes the list of photos that cannot be added, with its folder if that holds nothing else.

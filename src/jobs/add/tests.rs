@@ -99,6 +99,9 @@ fn close_ups_refine_what_they_show_and_the_scene_stays() {
     let new = open::scene(&at("whole")).expect("a scene");
     assert_eq!((new.cameras.len(), new.cameras.iter().filter(|c| c.held_out).count()), (13, 2));
     assert!(new.dataset_path.is_some_and(|p| open::dataset(&p).is_ok_and(|d| d.photos.len() == 13)));
+    // Killed before the list was written: nothing is in the way.
+    std::fs::create_dir_all(at("stopped0/photos")).expect("made");
+    std::fs::write(at("stopped0/photos/.joined.json.fmlgs-a1.tmp"), "{").expect("written");
     // Stopped at several places, and resumed: the same Gaussians.
     for (i, stop) in [3, 20, 60].into_iter().enumerate() {
         let out = format!("stopped{i}");
@@ -112,6 +115,10 @@ fn close_ups_refine_what_they_show_and_the_scene_stays() {
     let other = AddOptions { steps: Some(61), ..options.clone() };
     let error = run(&scene, &[at("near")], &other, &at("whole"), &mut Silent).expect_err("another request");
     assert!(error.to_string().contains("holds something"), "{error}");
+    std::fs::create_dir_all(at("own/photos")).expect("made");
+    std::fs::write(at("own/photos/mine.jpg"), "mine").expect("written");
+    let error = run(&scene, &[at("near")], &options, &at("own"), &mut Silent).expect_err("the control").to_string();
+    assert!(error.contains("holds something"), "{error}");
     let error = run(&scene, &[at("near")], &options, &at("scene"), &mut Silent).expect_err("itself").to_string();
     assert!(error.contains("the scene itself"), "{error}");
     // Once more, to what was made: all photos are there, and those that are known are no news.
