@@ -11,6 +11,7 @@ mod gather;
 mod told;
 
 use std::collections::BTreeSet;
+use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
@@ -84,7 +85,7 @@ pub(crate) struct AddedScene {
 pub(crate) fn beside(folder: &Path, paths: &[PathBuf], observer: &mut dyn Observer) -> Result<AddedScene, JobError> {
     let (scene, options) = (open::scene(folder)?, AddOptions::default());
     let request = request(&scene, paths, &options);
-    let is_usable = |out: &Path| is_begun(&request, out) || out.is_dir() && !files::holds_something(out);
+    let is_usable = |out: &Path| is_begun(&request, out) || is_bare(out);
     let out = derived::folder_beside(folder, CLOSER, is_usable);
     let done = run(&scene, paths, &options, &out, observer)?;
     if done.finished { Ok(done) } else { Err(Interrupted.into()) }
@@ -203,9 +204,10 @@ fn check(scene: &Scene, folder: &Path, request: &serde_json::Value, out: &Path) 
     if is_begun(request, out) || is_bare(out) { Ok(()) } else { derived::check(out) }
 }
 
-/// Returns whether a folder holds nothing but a place for photos without a list, as after a kill at the begin.
+/// Returns whether a folder holds nothing, or a place for photos without a list, as after a kill at the begin.
 fn is_bare(out: &Path) -> bool {
-    let is_alone = std::fs::read_dir(out).is_ok_and(|all| all.flatten().all(|entry| entry.file_name() == PHOTOS));
+    let is_ours = |name: &OsStr| name == PHOTOS || name.to_string_lossy().starts_with('.');
+    let is_alone = std::fs::read_dir(out).is_ok_and(|all| all.flatten().all(|entry| is_ours(&entry.file_name())));
     is_alone && !files::holds_something(&out.join(PHOTOS))
 }
 

@@ -47,7 +47,7 @@ impl Colmap {
     }
 
     fn stage(&self, step: MakerStep, args: Vec<String>) -> PoseStage {
-        PoseStage { title: step.title(), program: self.colmap.clone(), args, snapshots: None }
+        PoseStage::new(step.title(), self.colmap.clone(), args)
     }
 
     /// Command that finds features, or matches them.

@@ -41,13 +41,9 @@ pub(crate) fn install(places: &MakerPlaces, observer: &mut dyn Observer) -> Resu
     let title = "Installing pycolmap";
     let at = environment.to_string_lossy().into_owned();
     let words = |all: &[&str]| -> Vec<String> { all.iter().map(|word| (*word).to_owned()).collect() };
-    process::run(
-        &PoseStage { title, program: python, args: words(&["-m", "venv", &at]), snapshots: None },
-        0,
-        observer,
-    )?;
+    process::run(&PoseStage::new(title, python, words(&["-m", "venv", &at])), 0, observer)?;
     let program = python_of(environment).ok_or(JobError::NoPython)?;
     let pip = ["-m", "pip", "install", "--no-input", "--disable-pip-version-check", "--only-binary", ":all:", PACKAGE];
-    process::run(&PoseStage { title, program, args: words(&pip), snapshots: None }, 0, observer)?;
+    process::run(&PoseStage::new(title, program, words(&pip)), 0, observer)?;
     Ok(export::text(&environment.join(READY), "pycolmap\n")?)
 }

@@ -32,6 +32,13 @@ pub(super) struct PoseStage {
     pub(super) snapshots: Option<PathBuf>,
 }
 
+impl PoseStage {
+    /// A command that writes no snapshots.
+    pub(super) fn new(title: &'static str, program: PathBuf, args: Vec<String>) -> Self {
+        Self { title, program, args, snapshots: None }
+    }
+}
+
 /// A running program, killed when this is dropped.
 struct Running(Child);
 

@@ -237,7 +237,11 @@ mod tests {
             refiner.offsets[1]
         };
         let off = |found: PoseOffset| found.along.distance(offset.along) + found.turn.distance(offset.turn);
-        assert!(off(run(1.0, 1e-9)) < 0.03 * offset.along.length(), "{:?}", run(1.0, 1e-9));
+        let found = run(1.0, 1e-9);
+        // A single wrong one among right ones gives back a little of all that it found, and of nothing else.
+        let kept = found.along.dot(offset.along) / offset.along.length_squared();
+        let whole = PoseOffset { along: found.along / kept, turn: found.turn / kept };
+        assert!(off(whole) < 1e-4 && (0.98..1.0).contains(&kept), "{kept}: {found:?}");
         let held = run(1.0, 1e-2);
         assert!(held.along.length() < 0.6 * offset.along.length(), "the prior holds it: {held:?}");
         assert_eq!(run(0.0, 1e-9), PoseOffset::default(), "zeroed gradients move nothing");
