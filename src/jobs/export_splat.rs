@@ -230,7 +230,8 @@ fn drawn(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::pipeline::observer::{Progress, Signal, Silent};
+    use crate::pipeline::observer::Silent;
+    use crate::pipeline::observer::testing::StopsAfter;
     use crate::scene::{ExtraProperty, SplatRenderMode};
 
     fn cloud() -> Arc<GaussianCloud> {
@@ -299,15 +300,8 @@ mod tests {
             let e = check(&folder.path().join(name), &[]).expect_err(name).to_string();
             assert!(e.contains(".compressed.ply") && e.contains("meta.json"), "{e}");
         }
-        struct Stop;
-        impl Observer for Stop {
-            fn signal(&self) -> Signal {
-                Signal::Cancel
-            }
-            fn progress(&mut self, _: Progress) {}
-        }
         for name in ["a.ply", "a.compressed.ply", "a.spz", "a.sog", "meta.json", "a.splat", "a.glb", "a.gltf"] {
-            let e = run(&cloud(), &folder.path().join(name), None, &mut Stop).expect_err(name);
+            let e = run(&cloud(), &folder.path().join(name), None, &mut StopsAfter::new(0)).expect_err(name);
             assert!(e.is_cancelled(), "{name}: {e}");
         }
         let e = run(&Arc::default(), &folder.path().join("a.spz"), None, &mut Silent).expect_err("empty");

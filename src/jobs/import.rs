@@ -139,7 +139,8 @@ fn of_method(
 mod tests {
     use super::*;
     use crate::io::results::tests::{copied, expected, samples};
-    use crate::pipeline::observer::{Signal, Silent};
+    use crate::pipeline::observer::Silent;
+    use crate::pipeline::observer::testing::StopsAfter;
 
     fn import(sample: &str, out: &std::path::Path, scale: Option<f32>) -> Result<ImportedScene, JobError> {
         let request = ImportRequest {
@@ -226,15 +227,8 @@ mod tests {
         import("gaussian_grouping", &scene, None).expect("imported");
         let again = ImportRequest { path: scene, out: out.clone(), scale: None, options: ResultOptions::default() };
         assert!(matches!(run(&again, &mut Silent), Err(JobError::Output(e)) if e.contains("already")));
-        /// Stops at the first question.
-        struct Stopping;
-        impl Observer for Stopping {
-            fn signal(&self) -> Signal {
-                Signal::Cancel
-            }
-        }
         let request = ImportRequest { path: samples().join("thgs"), ..again };
-        assert!(run(&request, &mut Stopping).expect_err("stopped").is_cancelled());
+        assert!(run(&request, &mut StopsAfter::new(0)).expect_err("stopped").is_cancelled());
         assert!(!out.exists(), "nothing was written");
     }
 

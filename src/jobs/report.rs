@@ -124,13 +124,13 @@ pub(crate) fn known(scene: &Path, own: &Path) -> Vec<PathBuf> {
 
 #[cfg(test)]
 mod tests {
-    use std::sync::atomic::{AtomicUsize, Ordering};
 
     use glam::DVec3;
 
     use super::*;
     use crate::measure::BeginError;
-    use crate::pipeline::observer::{Signal, Silent};
+    use crate::pipeline::observer::Silent;
+    use crate::pipeline::observer::testing::StopsAfter;
     use crate::render::RenderSettings;
     use crate::scene::{Camera, GaussianCloud};
 
@@ -151,23 +151,12 @@ mod tests {
         ReportRequest { subject, stages, out, fresh: false, budget_secs: f64::INFINITY, command: "x".into() }
     }
 
-    /// Cancels after this many checks.
-    struct Patience(AtomicUsize);
-
-    impl Observer for Patience {
-        fn signal(&self) -> Signal {
-            let left = self.0.load(Ordering::Relaxed);
-            self.0.store(left.saturating_sub(1), Ordering::Relaxed);
-            if left > 0 { Signal::Continue } else { Signal::Cancel }
-        }
-    }
-
     #[test]
     fn preparing_a_stage_ends_in_time_and_when_it_is_to_stop() {
         let folder = tempfile::tempdir().expect("folder");
         let stages = |budget_secs: f64, patience: usize, name: &str| {
             let request = ReportRequest { budget_secs, ..request(folder.path().join(name)) };
-            let done = run(&request, &mut Patience(AtomicUsize::new(patience))).expect("measured");
+            let done = run(&request, &mut StopsAfter::new(patience)).expect("measured");
             assert!(is_report(&request.out), "a whole report is left");
             (done.end, done.report.stages.len())
         };

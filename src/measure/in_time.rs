@@ -32,20 +32,13 @@ impl Observer for InTime<'_> {
 mod tests {
     use super::*;
     use crate::pipeline::observer::Silent;
-
-    struct Stopped;
-
-    impl Observer for Stopped {
-        fn signal(&self) -> Signal {
-            Signal::Cancel
-        }
-    }
+    use crate::pipeline::observer::testing::StopsAfter;
 
     #[test]
     fn it_stops_in_time_and_where_somebody_asks_for_it() {
         assert!(InTime::new(&mut Silent, 0.0).proceed().is_err());
         assert!(InTime::new(&mut Silent, f64::INFINITY).proceed().is_ok());
         assert!(InTime::new(&mut Silent, 1e9).proceed().is_ok());
-        assert!(InTime::new(&mut Stopped, f64::INFINITY).proceed().is_err());
+        assert!(InTime::new(&mut StopsAfter::new(0), f64::INFINITY).proceed().is_err());
     }
 }

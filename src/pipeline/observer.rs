@@ -197,6 +197,8 @@ pub struct Silent;
 impl Observer for Silent {}
 
 #[cfg(test)]
+pub(crate) mod testing;
+#[cfg(test)]
 mod tests {
     use super::*;
 

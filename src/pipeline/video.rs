@@ -93,16 +93,11 @@ fn mark(pixels: &mut [[u8; 3]], width: usize, inside: impl Fn(usize) -> bool, co
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::pipeline::observer::{Signal, Silent};
+    use crate::pipeline::observer::Silent;
+    use crate::pipeline::observer::testing::StopsAfter;
 
     #[test]
     fn a_video_has_a_frame_per_camera_and_a_canceled_one_leaves_nothing() {
-        struct Impatient;
-        impl Observer for Impatient {
-            fn signal(&self) -> Signal {
-                Signal::Cancel
-            }
-        }
         let folder = tempfile::tempdir().expect("folder");
         let eye =
             |x: f64| Camera::look_at(glam::DVec3::new(x, 0.0, -2.0), glam::DVec3::ZERO, glam::DVec3::Y, 0.8, 32, 16);
@@ -126,7 +121,7 @@ mod tests {
         let summary = made.expect("a video");
         assert_eq!((summary.frames, summary.size_px), (5, (32, 16)));
         assert!(path.is_file());
-        let (stopped, path) = video("b.gif", &mut Impatient);
+        let (stopped, path) = video("b.gif", &mut StopsAfter::new(0));
         assert!(matches!(stopped, Err(VideoError::Interrupted(_))) && !path.exists());
         assert_eq!(std::fs::read_dir(folder.path()).expect("lists").count(), 1, "no half file");
     }

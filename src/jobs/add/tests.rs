@@ -6,7 +6,8 @@ use glam::DVec3;
 
 use super::*;
 use crate::io::transforms::opengl_pose;
-use crate::pipeline::observer::{Signal, Silent};
+use crate::pipeline::observer::Silent;
+use crate::pipeline::observer::testing::StopsAfter;
 use crate::pipeline::train::TrainConfig;
 use crate::render::{Features, RenderSettings, Renderer};
 use crate::scene::{Camera, GaussianCloud};
@@ -51,16 +52,6 @@ fn bytes(folder: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
     files.map(|p| (p.clone(), std::fs::read(p).expect("read"))).collect()
 }
 
-/// Stops at the n-th question.
-struct StopsAt(usize, std::cell::Cell<usize>);
-
-impl Observer for StopsAt {
-    fn signal(&self) -> Signal {
-        self.1.set(self.1.get() + 1);
-        if self.1.get() > self.0 { Signal::Cancel } else { Signal::Continue }
-    }
-}
-
 /// A scene trained from afar, and close-ups of it.
 fn far_and_near() -> (tempfile::TempDir, Scene) {
     let folder = tempfile::tempdir().expect("a folder");
@@ -102,10 +93,11 @@ fn close_ups_refine_what_they_show_and_the_scene_stays() {
     // Killed before the list was written: nothing is in the way.
     std::fs::create_dir_all(at("stopped0/photos")).expect("made");
     std::fs::write(at("stopped0/photos/.joined.json.fmlgs-a1.tmp"), "{").expect("written");
+    assert!(is_bare(&at("stopped0")) && !is_bare(&at("whole")) && !is_bare(&at("gone")), "where the window goes on");
     // Stopped at several places, and resumed: the same Gaussians.
     for (i, stop) in [3, 20, 60].into_iter().enumerate() {
         let out = format!("stopped{i}");
-        let stopped = add(&out, &mut StopsAt(stop, Default::default()));
+        let stopped = add(&out, &mut StopsAfter::new(stop));
         assert!(stopped.map_or_else(|e| e.is_cancelled(), |done| !done.finished), "at {stop}");
         assert!(add(&out, &mut Silent).expect("resumed").finished);
         let cloud = |name: &str| trained::load(&at(name)).expect("a scene").cloud;

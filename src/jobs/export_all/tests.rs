@@ -2,7 +2,6 @@
 
 use std::collections::BTreeMap;
 use std::path::Path;
-use std::sync::atomic::{AtomicUsize, Ordering};
 
 use glam::DVec3;
 
@@ -12,7 +11,8 @@ use crate::io::IoError;
 use crate::io::labels::Labels;
 use crate::io::labels::rle::Rle;
 use crate::io::splat_format::SplatFormat;
-use crate::pipeline::observer::{Signal, Silent};
+use crate::pipeline::observer::Silent;
+use crate::pipeline::observer::testing::StopsAfter;
 use crate::scene::{Identities, IdentityId, Level, Mask, NO_IDENTITY, Photo};
 
 const SIZE: [u32; 2] = [96, 72];
@@ -194,15 +194,9 @@ fn only_what_an_export_has_written_is_replaced() {
 
 #[test]
 fn a_canceled_export_can_be_made_again() {
-    struct Impatient(AtomicUsize);
-    impl Observer for Impatient {
-        fn signal(&self) -> Signal {
-            if self.0.fetch_add(1, Ordering::Relaxed) > 3 { Signal::Cancel } else { Signal::Continue }
-        }
-    }
     let folder = tempfile::tempdir().expect("folder");
     let request = request(folder.path(), &[MaskFormat::Ids]);
-    let stopped = run(&request, &mut Impatient(AtomicUsize::new(0)));
+    let stopped = run(&request, &mut StopsAfter::new(4));
     assert!(matches!(stopped, Err(JobError::Interrupted(_))), "{stopped:?}");
     assert!(files(folder.path()).len() < 7 && !files(folder.path()).is_empty());
     assert_eq!(run(&request, &mut Silent).expect("written").written, 7);

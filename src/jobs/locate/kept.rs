@@ -106,16 +106,8 @@ impl PhotoLocator {
 mod tests {
     use super::*;
     use crate::jobs::locate::testing::{TestPlace, photo_of};
-    use crate::pipeline::observer::{Signal, Silent};
-
-    /// An observer that asks to stop.
-    struct Stops;
-
-    impl Observer for Stops {
-        fn signal(&self) -> Signal {
-            Signal::Cancel
-        }
-    }
+    use crate::pipeline::observer::Silent;
+    use crate::pipeline::observer::testing::StopsAfter;
 
     #[test]
     fn a_photo_is_located_once_and_again_when_its_file_changes() {
@@ -136,7 +128,7 @@ mod tests {
     fn it_stops_when_asked_and_goes_on_with_the_next_photo() {
         let place = TestPlace::new();
         let locator = PhotoLocator::new(place.scene());
-        assert!(locator.locate(&place.photo, &mut Stops).expect_err("stopped").is_cancelled());
+        assert!(locator.locate(&place.photo, &mut StopsAfter::new(0)).expect_err("stopped").is_cancelled());
         assert!(locator.locate(&place.photo, &mut Silent).expect("looked for").located);
         let gone = locator.locate(&place.photo.with_file_name("gone.jpg"), &mut Silent).expect("told");
         assert!(!gone.located && gone.problem.is_some_and(|p| p.contains("gone.jpg")));

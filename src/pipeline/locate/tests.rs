@@ -1,7 +1,5 @@
 //! Photos rendered of a made-up scene are located in it; photos of other things are refused.
 
-use std::sync::atomic::{AtomicUsize, Ordering};
-
 use glam::{DMat3, DQuat, DVec2, DVec3};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
@@ -9,7 +7,8 @@ use rand_pcg::Pcg64Mcg;
 use super::matched::SUPPORTED;
 use super::testing::{at, fine_scene, scene, settings};
 use super::*;
-use crate::pipeline::observer::{Signal, Silent};
+use crate::pipeline::observer::Silent;
+use crate::pipeline::observer::testing::StopsAfter;
 use crate::render::{Features, Renderer};
 
 fn ring() -> Vec<Camera> {
@@ -152,17 +151,6 @@ fn a_close_up_of_another_scene_is_refused() {
     }
 }
 
-/// Cancels after some queries.
-struct CancelsLater(AtomicUsize);
-
-impl Observer for CancelsLater {
-    fn signal(&self) -> Signal {
-        let left = self.0.load(Ordering::Relaxed);
-        self.0.store(left.saturating_sub(1), Ordering::Relaxed);
-        if left > 0 { Signal::Continue } else { Signal::Cancel }
-    }
-}
-
 #[test]
 fn a_search_for_close_ups_can_be_canceled_at_each_view() {
     let mut locator = locator_from_afar();
@@ -170,7 +158,7 @@ fn a_search_for_close_ups_can_be_canceled_at_each_view() {
     let gray = GrayPlane::of_photo(&photo(&fine_scene(2), &near, |_, _, v| v));
     let alike = locator.gallery.alike(&gray, &near);
     let seen = SeenPhoto { features: features(&gray, MOST_FEATURES), lens: &near, focals: &[1.0] };
-    let found = matched(&mut locator.gallery, &seen, &alike, &CLOSE_UPS, &CancelsLater(AtomicUsize::new(4)));
+    let found = matched(&mut locator.gallery, &seen, &alike, &CLOSE_UPS, &StopsAfter::new(4));
     assert!(matches!(found, Err(LocateError::Interrupted(_))));
 }
 

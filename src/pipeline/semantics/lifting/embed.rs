@@ -171,7 +171,8 @@ mod tests {
     use glam::DVec3;
 
     use super::*;
-    use crate::pipeline::observer::{Signal, Silent};
+    use crate::pipeline::observer::Silent;
+    use crate::pipeline::observer::testing::StopsAfter;
     use crate::scene::{Camera, NO_IDENTITY, PART_WEIGHT};
 
     /// Sees whether there is red in a picture, and nothing else.
@@ -258,16 +259,18 @@ mod tests {
 
     #[test]
     fn looking_can_be_stopped() {
-        struct Stop;
-        impl Observer for Stop {
-            fn signal(&self) -> Signal {
-                Signal::Cancel
-            }
-        }
         let folder = tempfile::tempdir().expect("a folder");
         let (cloud, map, photos) = doll(folder.path());
         let mut encoder = Reddish { side_px: None, tiles: vec![] };
-        let stopped = embed(&cloud, &map, &photos, &RenderSettings::default(), PART_WEIGHT, &mut encoder, &mut Stop);
+        let stopped = embed(
+            &cloud,
+            &map,
+            &photos,
+            &RenderSettings::default(),
+            PART_WEIGHT,
+            &mut encoder,
+            &mut StopsAfter::new(0),
+        );
         assert!(matches!(stopped, Err(FindError::Interrupted(_))), "{stopped:?}");
     }
 

@@ -138,15 +138,9 @@ fn wrong_settings_are_named() {
 
 #[test]
 fn canceling_leaves_no_data_set() {
-    struct Stop;
-    impl Observer for Stop {
-        fn signal(&self) -> Signal {
-            Signal::Cancel
-        }
-    }
     let (out, _) = write(&small());
     assert!(out.path().join("transforms.json").is_file());
-    let result = render_scene(&two_cubes(), "two", None, &small(), out.path(), &mut Stop);
+    let result = render_scene(&two_cubes(), "two", None, &small(), out.path(), &mut StopsAfter::new(0));
     assert!(matches!(result, Err(SynthError::Interrupted(_))));
     assert!(!out.path().join("transforms.json").exists());
 }

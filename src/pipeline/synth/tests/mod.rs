@@ -12,7 +12,8 @@ use serde_json::{Value, json};
 
 use super::*;
 use crate::io::gltf_mesh::tests::{cubes, glb, real_scenes};
-use crate::pipeline::observer::{Signal, Silent};
+use crate::pipeline::observer::Silent;
+use crate::pipeline::observer::testing::StopsAfter;
 use crate::scene::Camera;
 use crate::scene::Level;
 

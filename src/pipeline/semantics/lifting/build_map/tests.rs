@@ -6,7 +6,8 @@ use std::sync::Arc;
 use glam::DVec3;
 
 use super::*;
-use crate::pipeline::observer::{Interrupted, Signal, Silent};
+use crate::pipeline::observer::testing::StopsAfter;
+use crate::pipeline::observer::{Interrupted, Silent};
 use crate::pipeline::semantics::lifting::segmenter::FoundMask;
 use crate::pipeline::semantics::view_map::ViewMap;
 use crate::render::Renderer;
@@ -216,15 +217,10 @@ fn codes_are_trained_on_masks_and_never_on_what_votes_make_of_them() {
 
 #[test]
 fn nothing_to_begin_with_and_a_stop_are_told() {
-    struct Stop;
-    impl Observer for Stop {
-        fn signal(&self) -> Signal {
-            Signal::Cancel
-        }
-    }
     let nothing =
         find(Told { named: true, covers: false }, (Lifting::Votes, 0), 12, &mut Silent).expect_err("no masks");
     assert!(!Interrupted::is_cause_of(&nothing) && nothing.to_string().contains("'told'"), "{nothing}");
-    let stopped = find(Told { named: true, covers: true }, (Lifting::Votes, 0), 12, &mut Stop).expect_err("stopped");
+    let stopped = find(Told { named: true, covers: true }, (Lifting::Votes, 0), 12, &mut StopsAfter::new(0))
+        .expect_err("stopped");
     assert!(Interrupted::is_cause_of(&stopped), "{stopped}");
 }

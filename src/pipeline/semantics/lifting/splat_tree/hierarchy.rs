@@ -212,7 +212,8 @@ pub(super) mod tests {
     use glam::DVec3;
 
     use super::*;
-    use crate::pipeline::observer::{Interrupted, Signal, Silent};
+    use crate::pipeline::observer::testing::StopsAfter;
+    use crate::pipeline::observer::{Interrupted, Silent};
     use crate::pipeline::semantics::lifting::splat_tree::marks::Stroke;
     use crate::render::Renderer;
     use crate::scene::Mask;
@@ -344,12 +345,6 @@ pub(super) mod tests {
 
     #[test]
     fn extreme_clouds_and_a_stop() {
-        struct Stop;
-        impl Observer for Stop {
-            fn signal(&self) -> Signal {
-                Signal::Cancel
-            }
-        }
         let settings = RenderSettings::default();
         for n in [0, 1, 2] {
             let cloud = GaussianCloud::isotropic(vec![[0.0; 3]; n], -2.0, 3.0);
@@ -365,7 +360,7 @@ pub(super) mod tests {
         let tree = Hierarchy::new(&cloud, &cameras(), &settings, &mut Silent).expect("made");
         let selected = tree.select(&marks(&cloud, &[dot([0.0, 0.0], true)]), &[]);
         assert!(selected[..39].iter().any(|s| *s) && !selected[39]);
-        let stopped = Hierarchy::new(&sheet().0, &cameras(), &settings, &mut Stop).expect_err("stopped");
+        let stopped = Hierarchy::new(&sheet().0, &cameras(), &settings, &mut StopsAfter::new(0)).expect_err("stopped");
         assert!(Interrupted::is_cause_of(&stopped), "{stopped}");
     }
 }
