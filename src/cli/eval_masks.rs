@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use serde_json::json;
+use strum::VariantArray;
 
 use super::{CliError, output};
 use crate::jobs::evaluate::PhotoComparison;
@@ -10,6 +11,7 @@ use crate::jobs::evaluate_masks::{self, Protocol, ProtocolSummary};
 use crate::math::format::count;
 use crate::math::stats::mean;
 use crate::pipeline::semantics::evaluation::Unit;
+use crate::pipeline::semantics::evaluation::limits::{Cause, LimitRow, SIZES};
 use crate::pipeline::semantics::evaluation::part_recall::{HIT_IOU, Row};
 use crate::pipeline::semantics::evaluation::recipes::RecipeRow;
 use crate::pipeline::semantics::evaluation::strokes::{STROKES, StrokeRow};
@@ -65,6 +67,9 @@ fn summary(summary: &ProtocolSummary) -> String {
             format!("mean IoU: objects {object_miou:.4}, parts {part_miou:.4}")
         }
         ProtocolSummary::Langsplat { localization } => format!("localization accuracy {localization:.4}"),
+        ProtocolSummary::Limits { rows } => {
+            format!("true labels of these views voted for all Gaussians\n{}", output::table(&limits(rows)))
+        }
         ProtocolSummary::FastlgsEx {} => {
             "values are running pooled IoUs; not comparable with those of other protocols".to_owned()
         }
@@ -89,6 +94,19 @@ fn summary(summary: &ProtocolSummary) -> String {
             format!("found with IoU {HIT_IOU}; what is absent is rightly not found\n{table}")
         }
     }
+}
+
+/// Scores, limits and losses by kind of label.
+fn limits(rows: &[LimitRow]) -> Vec<Vec<String>> {
+    let sizes = SIZES.map(|size| if size == 1 { "limit".into() } else { format!("at 1/{size}") });
+    let causes = Cause::VARIANTS.iter().map(|cause| <&str>::from(cause).to_owned());
+    let head = ["", "labels", "IoU"].map(str::to_owned);
+    let mut table = vec![head.into_iter().chain(sizes).chain(causes).collect::<Vec<_>>()];
+    table.extend(rows.iter().map(|r| {
+        let values = [r.iou].into_iter().chain(r.limits).chain(r.lost);
+        [r.labels.to_owned(), r.count.to_string()].into_iter().chain(values.map(|v| format!("{v:.3}"))).collect()
+    }));
+    table
 }
 
 /// Things by how well strokes select them, the worst first, and the means.

@@ -16,7 +16,7 @@ use crate::math::stats::mean;
 use crate::pipeline::observer::Silent;
 use crate::pipeline::semantics::code_map::CodeMap;
 use crate::pipeline::semantics::evaluation::{
-    AskedScene, Category, LabeledView, Unit, categories, fastlgs_ex, langsplat, masks, means, multi_class, part_recall,
+    AskedScene, Category, LabeledView, Unit, categories, fastlgs_ex, langsplat, limits, masks, means, multi_class, part_recall,
     recipes, selection_3d, spin_nerf, strokes,
 };
 use crate::pipeline::semantics::lifting::segmenter::{FileMasks, Segmenter};
@@ -38,6 +38,9 @@ pub(crate) enum ProtocolSummary {
     Langsplat {
         /// Share of queries whose most relevant pixel lies in their box.
         localization: f64,
+    },
+    Limits {
+        rows: Vec<limits::LimitRow>,
     },
     FastlgsEx {},
     Selection3d {
@@ -182,6 +185,10 @@ fn compare(
             views.iter().for_each(|v| units.extend(langsplat::compare(scene, v)));
             let hits = units.iter().filter(|u| u.hit == Some(true)).count();
             ProtocolSummary::Langsplat { localization: hits as f64 / units.len().max(1) as f64 }
+        }
+        Protocol::Limits => {
+            let rows = limits::rows(scene, views, &comparison.cloud, &comparison.settings)?;
+            ProtocolSummary::Limits { rows }
         }
         Protocol::FastlgsEx | Protocol::PartRecall | Protocol::Recipes | Protocol::Strokes | Protocol::Corrections => {
             let mut pool = fastlgs_ex::Pool::default();

@@ -7,6 +7,8 @@ pub(crate) enum Protocol {
     Masks,
     /// LERF-OVS as LangSplat counts it: smoothed relevancy cut at 0.4, and localization
     Langsplat,
+    /// What true labels would reach with the same Gaussians, and what the answers lose, by cause
+    Limits,
     /// FastLGS's evaluator, with its running pooled IoU; for comparison with published numbers only
     FastlgsEx,
     /// Gaussians chosen by text, their silhouette cut at 0.7 (OpenGaussian)
@@ -35,6 +37,6 @@ impl Protocol {
 
     /// Returns whether the mean over all queries has a meaning.
     pub(crate) fn has_units(self) -> bool {
-        !matches!(self, Self::PartRecall | Self::Recipes | Self::Strokes | Self::Corrections)
+        !matches!(self, Self::Limits | Self::PartRecall | Self::Recipes | Self::Strokes | Self::Corrections)
     }
 }

@@ -13,6 +13,7 @@ pub(crate) mod fastlgs_ex;
 #[cfg(test)]
 mod hand_computed_tests;
 pub(crate) mod langsplat;
+pub(crate) mod limits;
 pub(crate) mod masks;
 pub(crate) mod multi_class;
 pub(crate) mod part_recall;

@@ -6,14 +6,12 @@ use super::edit::add;
 use super::error::FindError;
 use super::segmenter::{FoundMask, Segmenter};
 use super::tracker::labels_of;
-use super::votes::{UNKNOWN, Votes};
+use super::votes::{LEAST_VOTES, UNKNOWN, Votes};
 use crate::pipeline::observer::{Observer, Ticker};
 use crate::pipeline::semantics::view_map::ViewMap;
 use crate::render::{RenderSettings, Renderer};
 use crate::scene::{GaussianCloud, IdentityId, Level, NO_IDENTITY, Photo, SemanticMap};
 
-/// Least weight of votes for a Gaussian to change its identity, px.
-const LEAST_VOTES: f32 = 0.05;
 /// Least number of pixels of a mask of a new identity.
 const LEAST_PX: usize = 24;
 /// Least share of a mask that lies in its whole, and largest share of the whole's pixels that it takes.

@@ -30,6 +30,8 @@ pub(crate) struct Votes {
 const KNOWN: f32 = 10.0;
 const KNOWN_NOBODY: f32 = 0.1;
 
+/// Least votes for a Gaussian to be decided, px.
+pub(crate) const LEAST_VOTES: f32 = 0.05;
 /// Default least share of its largest area for a Gaussian to be voted on in a view.
 pub(crate) const LEAST_SEEN: f32 = 0.1;
 

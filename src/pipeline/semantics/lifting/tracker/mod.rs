@@ -21,16 +21,13 @@ use super::sam2_tracker::{LABEL_SIDE_PX, Sam2Tracker};
 use super::segmenter::{FoundMask, Segmenter};
 use super::splat_tree::hierarchy::Hierarchy;
 use super::train_codes::{CODE_SIDE_PX, CodeView};
-use super::votes::{Assignment, UNKNOWN, Votes};
+use super::votes::{Assignment, LEAST_VOTES, UNKNOWN, Votes};
 use crate::math::format::things;
 use crate::pipeline::observer::{Observer, Severity, Ticker, begin};
 use crate::pipeline::semantics::view_map::ViewMap;
 use crate::render::{RenderSettings, Renderer};
 use crate::scene::findings::{ConflictKind, MaskConflict, PhotoFinding, Seen, SegmentationReport};
 use crate::scene::{GaussianCloud, Identities, IdentityId, NO_IDENTITY, Photo};
-
-/// Least weight of votes for a Gaussian to have an identity, in px of the photos voted on.
-const LEAST_VOTES: f32 = 0.05;
 
 /// IoU under which a followed mask and that of the Gaussians contradict each other.
 const DRIFT: f64 = 0.2;

@@ -1,0 +1,123 @@
+#!/usr/bin/env python3
+"""Identity unseen: objects and parts of seven scenes from one labeled photo each, in views that training did not see.
+
+usage: tools/bars.py [--program PATH] [--out DIR] [--keep] [--write] [NAME...]
+
+Trains each scene, finds its objects from one photo's labels, and compares all names with the labels of other views
+(`fmlgs eval --protocol limits`). Fails if objects or parts are more than 0.01 below docs/results/bars.csv.
+--keep takes scenes that an earlier run trained; --write writes the table. `make bars` builds and runs all, in about
+20 minutes on two cores.
+"""
+
+import argparse
+import csv
+import datetime
+import json
+import os
+import pathlib
+import shutil
+import subprocess
+import sys
+import time
+import zipfile
+
+ROOT = pathlib.Path(__file__).resolve().parent.parent
+DATA = pathlib.Path(os.environ.get("FMLGS_DATA", ROOT.parent / "shared/data"))
+TABLE = ROOT / "docs/results/bars.csv"
+ORIGIN = "# tools/bars.py --write; two CPU cores without a GPU; mean IoU of names in unseen views, one labeled photo; limit: true labels of all views with the same Gaussians; recorded "
+COLUMNS = ["scene", "objects", "parts", "large_parts", "objects_limit", "parts_limit", "large_parts_limit"]
+LARGEST_FALL = 0.01
+ROWS = {"objects": "objects", "parts": "parts", "large parts": "large_parts"}
+RENDERED = ["--size", "400x300", "--view-count", "48", "--samples", "2"]
+
+
+def rendered(path):
+    """Photos of a glTF scene, with the ids of every pixel as labels."""
+    return lambda run, folder: (run("synth", path, "--out", folder / "photos", *RENDERED), folder / "photos")[1]
+
+
+def demo(_, folder):
+    """Photos of the demo that ships with the program."""
+    with zipfile.ZipFile(ROOT / "assets/demo/demo.zip") as archive:
+        archive.extractall(folder, [n for n in archive.namelist() if n.startswith("photos/")])
+    return folder / "photos"
+
+
+GLTF = DATA / "gltf"
+# Photos; labels of one photo and of the others, None = the photos' own; options of training and of evaluation.
+SCENES = {
+    "plush": (lambda *_: DATA / "plush", DATA / "plush_labels/seed", ROOT / "tests/data/plush_labels", "378", "1500", ["--held-out-every", "0"]),
+    "demo": (demo, None, None, "400", "1500", []),
+    "desk": (rendered(ROOT / "assets/eval/desk.glb"), None, None, "400", "1000", []),
+    "kitchen": (rendered(ROOT / "assets/eval/kitchen.glb"), None, None, "400", "1000", []),
+    "shelf": (rendered(ROOT / "assets/eval/shelf.glb"), None, None, "400", "1000", []),
+    "truck": (rendered(GLTF / "CesiumMilkTruck/CesiumMilkTruck.glb"), None, None, "400", "800", []),
+    "motorcycle": (rendered(GLTF / "kenney_vehicles/vehicle-motorcycle.glb"), None, None, "400", "800", []),
+    "chair": (rendered(GLTF / "SheenChair/SheenChair.gltf"), None, None, "400", "800", []),
+}
+
+
+def measure(name, program, out, keep):
+    """Row of the table; None if the scene's photos are not here."""
+    photos_of, seed, labels, side, steps, options = SCENES[name]
+    folder = out / name
+
+    def run(*args):
+        done = subprocess.run([program, "-q", *map(str, args)], capture_output=True, text=True)
+        if done.returncode:
+            sys.exit(f"{name}: fmlgs {args[0]}: {done.stderr.strip()}")
+        return done.stdout
+
+    scene = folder / "scene"
+    if not (keep and (scene / "point_cloud.ply").exists()):
+        shutil.rmtree(folder, ignore_errors=True)
+        folder.mkdir(parents=True)
+        photos = photos_of(run, folder)
+        run("train", photos, "--out", scene, "--max-side", side, "--steps", steps, "--eval-every", "0")
+    photos = folder / "photos" if (folder / "photos").exists() else DATA / name
+    run("preprocess", scene, "--masks", seed or photos, "--max-seeds", "1", "--encoder", "none", "--replace-all")
+    scores = run("eval", scene, "--masks", labels or photos, "--protocol", "limits", "--json", *options)
+    rows = {row["labels"]: row for row in json.loads(scores)["rows"]}
+    value = lambda kind, key: f"{key(rows[kind]):.3f}" if kind in rows else ""
+    return [name, *(value(k, lambda r: r["iou"]) for k in ROWS), *(value(k, lambda r: r["limits"][0]) for k in ROWS)]
+
+
+def falls(row, known):
+    """What is worse than in the table, in words."""
+    pairs = [(c, float(n), float(k)) for c, n, k in zip(COLUMNS[1:4], row[1:4], known[1:4]) if n and k]
+    return [f"{c} {n:.3f}, {k:.3f} before" for c, n, k in pairs if n < k - LARGEST_FALL]
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("names", nargs="*", choices=[[], *SCENES], metavar="NAME")
+    parser.add_argument("--program", default=ROOT / "target/release/fmlgs")
+    parser.add_argument("--out", type=pathlib.Path, default=ROOT / "out/bars")
+    parser.add_argument("--keep", action="store_true")
+    parser.add_argument("--write", action="store_true")
+    args = parser.parse_args()
+    known = {}
+    if TABLE.exists():
+        known = {row[0]: row for row in csv.reader(TABLE.read_text().splitlines()[2:])}
+    print(",".join([*COLUMNS, "secs"]), flush=True)
+    bad = []
+    for name in args.names or SCENES:
+        if SCENES[name][1] and not DATA.exists():
+            print(f"skipped: {name}: its photos are not here")
+            continue
+        started = time.monotonic()
+        row = measure(name, args.program, args.out, args.keep)
+        print(",".join([*row, f"{time.monotonic() - started:.0f}"]), flush=True)
+        if args.write:
+            known[name] = row
+        else:
+            bad += [f"{name}: {text}" for text in (falls(row, known[name]) if name in known else ["not in the table"])]
+    if args.write:
+        rows = [known[name] for name in SCENES if name in known]
+        lines = [ORIGIN + datetime.date.today().isoformat(), ",".join(COLUMNS), *(",".join(row) for row in rows)]
+        TABLE.write_text("\n".join(lines) + "\n")
+    if bad:
+        sys.exit("worse than docs/results/bars.csv:\n" + "\n".join(bad))
+
+
+main()
