@@ -166,6 +166,7 @@ pub(crate) fn run(args: PreprocessArgs, quiet: bool) -> Result<(), CliError> {
         done.map_err(|e| CliError::of_work(e, "nothing was stored"))?;
     let Found { map, views, secs: stages } = found;
     let unknown = map.findings.as_ref().and_then(SegmentationReport::unknown);
+    let next = map.findings.as_ref().and_then(SegmentationReport::next_to_label);
     if args.json {
         return output::print_json(&json!({
             "scene": args.scene,
@@ -177,6 +178,7 @@ pub(crate) fn run(args: PreprocessArgs, quiet: bool) -> Result<(), CliError> {
             "stages": stages.iter().map(|(stage, secs)| json!({ "stage": stage, "secs": secs })).collect::<Vec<_>>(),
             "identities": identities(&map),
             "unknown": unknown,
+            "next_to_label": next.map(|(photo, inferred)| json!({ "photo": photo, "inferred": inferred })),
             "views": views.iter().map(|v| json!({
                 "photo": photos[v.photo].name, "unknown": v.unknown, "seen": v.seen,
             })).collect::<Vec<_>>(),
@@ -188,8 +190,11 @@ pub(crate) fn run(args: PreprocessArgs, quiet: bool) -> Result<(), CliError> {
         [] => String::new(),
         names => format!("\nkept by hand: {}; --replace-all finds them anew", names.join(", ")),
     };
+    let next = next.map_or_else(String::new, |(photo, inferred)| {
+        format!("\nmost would be learned from labels of {photo}: {:.0} % of it is inferred", 100.0 * inferred)
+    });
     output::print(&format!(
-        "{} from {} in {secs:.1} s, {:.1} % of the photos unknown, {}; ask with 'fmlgs query {} \"...\"'{kept}",
+        "{} from {} in {secs:.1} s, {:.1} % of the photos unknown, {}; ask with 'fmlgs query {} \"...\"'{kept}{next}",
         map.identities.counted(),
         things(map.seeds.len(), "photo"),
         100.0 * unknown.unwrap_or(0.0),

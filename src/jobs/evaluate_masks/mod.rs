@@ -16,8 +16,8 @@ use crate::math::stats::mean;
 use crate::pipeline::observer::Silent;
 use crate::pipeline::semantics::code_map::CodeMap;
 use crate::pipeline::semantics::evaluation::{
-    AskedScene, Category, LabeledView, Unit, categories, fastlgs_ex, langsplat, limits, masks, means, multi_class, part_recall,
-    recipes, selection_3d, spin_nerf, strokes,
+    AskedScene, Category, LabeledView, Unit, categories, fastlgs_ex, langsplat, limits, masks, means, multi_class,
+    part_recall, recipes, selection_3d, spin_nerf, strokes,
 };
 use crate::pipeline::semantics::lifting::segmenter::{FileMasks, Segmenter};
 use crate::pipeline::semantics::lifting::splat_tree::hierarchy::Hierarchy;

@@ -14,9 +14,9 @@ use super::super::viewport::visible::Visibility;
 use super::PaneContents;
 use super::object_facts::{ListOrder, RowFacts};
 use super::object_thumbnails::ObjectThumbnails;
-use crate::math::format::things;
+use crate::math::format::{self, things};
 use crate::pipeline::semantics::lifting::edit::Edit;
-use crate::scene::{Identities, IdentityId, NO_IDENTITY};
+use crate::scene::{Identities, IdentityId, NO_IDENTITY, SegmentationReport, text};
 use crate::ui::actions::Action;
 use crate::worker::Makes;
 
@@ -70,6 +70,7 @@ impl PaneContents for ObjectsPane {
                 self.order = ListOrder::by_doubts();
             }
         }
+        show_next_photo(ui, cx, map.findings.as_ref().and_then(SegmentationReport::next_to_label));
         if identities.iter().all(|(_, i)| i.names.is_empty()) {
             ui.weak("Regions of the photos, without names yet. Click one to see it, double-click to name it.");
         }
@@ -108,6 +109,19 @@ impl PaneContents for ObjectsPane {
         ScrollArea::vertical().auto_shrink([false, false]).show(ui, |ui| {
             tree.branches(ui, Id::unique("objects"), roots, cx);
         });
+    }
+}
+
+/// Shows the photo whose labels would tell most.
+fn show_next_photo(ui: &mut Ui, cx: &mut Ctx<'_>, next: Option<(&str, f64)>) {
+    let photos = cx.state.scene.as_ref().and_then(|s| s.dataset.as_deref()).map(|d| &d.photos);
+    let Some((name, inferred)) = next else { return };
+    let Some(place) = photos.and_then(|photos| photos.iter().position(|p| p.name == name)) else { return };
+    let file = text::elided(name.rsplit('/').next().unwrap_or_default(), 40);
+    let link = ui.link(format!("{} of {file} is inferred", format::percent(inferred)));
+    let why = "No mask shows it. Labels of this photo would tell most. Click to go there";
+    if link.on_hover_text(why).clicked() {
+        cx.ask(Action::GoToPhoto(place));
     }
 }
 

@@ -13,9 +13,7 @@ use crate::pipeline::semantics::lifting::votes::{Assignment, LEAST_VOTES, UNKNOW
 use crate::pipeline::semantics::view_map::ViewMap;
 use crate::render::{DrawError, RenderSettings, Renderer};
 use crate::scene::identity::whole_names::BETWEEN;
-use crate::scene::{
-    Camera, GaussianCloud, Identities, IdentityId, Level, LevelFilter, Mask, NO_IDENTITY, SemanticMap,
-};
+use crate::scene::{Camera, GaussianCloud, Identities, IdentityId, Level, LevelFilter, Mask, NO_IDENTITY, SemanticMap};
 
 /// Sizes of the drawn mask, as divisors of the label's.
 pub(crate) const SIZES: [u32; 3] = [1, 2, 4];
@@ -28,6 +26,9 @@ pub(crate) const LARGE_PX: usize = 100;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, VariantArray, strum::IntoStaticStr, serde::Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub(crate) enum Cause {
+    /// No labeled photo shows it, so that nothing has its name.
+    #[strum(serialize = "unseen")]
+    Unseen,
     /// True labels are wrong here too, at most [`RIM_PX`] from the label's border.
     #[strum(serialize = "rim")]
     Rim,
@@ -93,7 +94,7 @@ pub(crate) fn rows(
             let id = truth.by_name[&category.name];
             let limits: Vec<Mask> = limits.iter().map(|map| truth.mask(map, id, &category.mask)).collect();
             let known = known(scene.map, view.exact, &category.name);
-            let lost = lost(category, &mask, &limits[0], &known, &kind.identity);
+            let lost = lost(category, &mask, &limits[0], known.as_ref(), &kind.identity);
             let limits = std::array::from_fn(|k| limits[k].iou(&category.mask));
             let (level, area, iou) = (category.level, category.mask.area(), mask.iou(&category.mask));
             units.push(LimitUnit { level, area, iou, limits, lost });
@@ -102,12 +103,14 @@ pub(crate) fn rows(
     Ok(summarize(&units))
 }
 
-/// Pixels of the identities called so.
-fn known(map: &SemanticMap, exact: &ViewMap, name: &str) -> Mask {
-    let mut mask = Mask::empty(exact.width_px, exact.height_px);
+/// Pixels of the identities called so; `None` if there are no such identities.
+fn known(map: &SemanticMap, exact: &ViewMap, name: &str) -> Option<Mask> {
     let named = map.identities.called(name, LevelFilter::Auto);
-    named.into_iter().for_each(|id| mask.add(&exact.mask(&map.identities, id)));
-    mask
+    let masks = named.into_iter().map(|id| exact.mask(&map.identities, id));
+    masks.reduce(|mut all, mask| {
+        all.add(&mask);
+        all
+    })
 }
 
 /// What each Gaussian's label rests on, as identities in the order of [`Cause`].
@@ -128,12 +131,16 @@ fn lost(
     category: &Category,
     answer: &Mask,
     limit: &Mask,
-    known: &Mask,
+    known: Option<&Mask>,
     evidence: &[IdentityId],
 ) -> [f64; Cause::VARIANTS.len()] {
     let truth = &category.mask;
     let mut counts = [0_usize; Cause::VARIANTS.len()];
     for i in (0..evidence.len()).filter(|&i| answer.contains(i) != truth.contains(i)) {
+        let Some(known) = known else {
+            counts[Cause::Unseen as usize] += 1;
+            continue;
+        };
         let cause = match Cause::VARIANTS.get((evidence[i] as usize).wrapping_sub(1)) {
             _ if limit.contains(i) != truth.contains(i) && at_rim(truth, i) => Cause::Rim,
             _ if limit.contains(i) != truth.contains(i) => Cause::Straddling,
@@ -265,6 +272,16 @@ mod tests {
     /// Asks a scene in which the Gaussians have these labels ("mug", 1) with these margins, by a label of the pixels
     /// that `is_mug` says.
     fn row(of: [IdentityId; 2], margin: [f32; 2], is_mug: impl Fn(usize, f32) -> bool + Sync) -> LimitRow {
+        row_of("mug", of, margin, is_mug)
+    }
+
+    /// The same, asked for another thing in place of the mug.
+    fn row_of(
+        asked: &str,
+        of: [IdentityId; 2],
+        margin: [f32; 2],
+        is_asked: impl Fn(usize, f32) -> bool + Sync,
+    ) -> LimitRow {
         let (cloud, camera) = plates();
         let mut identities = Identities::default();
         identities.add(Level::Object, NO_IDENTITY, vec!["mug".into()]);
@@ -275,9 +292,9 @@ mod tests {
         let left = camera.project(DVec3::new(-0.5, 0.0, 0.0)).expect("in front").x < SIZE.0 as f64 / 2.0;
         let column = |x: usize| if left { x } else { SIZE.0 - 1 - x };
         let mask =
-            Mask::from_fn(SIZE.0, SIZE.1, |i| exact.alpha[i] > 0.02 && is_mug(column(i % SIZE.0), exact.alpha[i]));
+            Mask::from_fn(SIZE.0, SIZE.1, |i| exact.alpha[i] > 0.02 && is_asked(column(i % SIZE.0), exact.alpha[i]));
         let category =
-            Category { name: "mug".into(), level: Level::Object, boxes: mask.bounds().into_iter().collect(), mask };
+            Category { name: asked.into(), level: Level::Object, boxes: mask.bounds().into_iter().collect(), mask };
         let blended = CodeMap::default();
         let view =
             LabeledView { name: "a", camera: &camera, exact: &exact, blended: &blended, categories: vec![category] };
@@ -304,6 +321,7 @@ mod tests {
         only(Cause::Unknown, &row([NO_IDENTITY, 2], [0.0; 2], is_left));
         only(Cause::Inherited, &row([2, 2], [0.0; 2], is_left));
         only(Cause::Voted, &row([2, 2], [0.7; 2], is_left));
+        only(Cause::Unseen, &row_of("jug", [1, 2], [0.7; 2], is_left));
         // Half of a plate is a thing of its own, which no Gaussian can say.
         let half = row([1, 2], [1.0; 2], |x, _| x < SIZE.0 / 4);
         only(Cause::Straddling, &half);

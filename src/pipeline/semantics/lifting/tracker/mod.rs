@@ -48,6 +48,8 @@ pub(crate) struct Tracked {
     pub(crate) seeds: Vec<usize>,
     /// Report of every photo, without the identities that hidden Gaussians inherit from those around them.
     pub(crate) views: Vec<ViewReport>,
+    /// Share of the pixels of each of these photos that no mask speaks for.
+    pub(crate) inferred: Vec<f64>,
     /// Disagreements of masks with the identities known before, with the photo.
     pub(crate) conflicts: Vec<(usize, ConflictKind)>,
     /// The masks of the photos that were segmented and of those to which they were followed.
@@ -69,9 +71,13 @@ impl Tracked {
         let conflict = |(photo, what): &(usize, ConflictKind)| {
             place(*photo).map(|k| MaskConflict { photo: k as u32, what: what.clone() })
         };
-        let name = |v: &ViewReport| PhotoFinding { name: photos[v.photo].name.clone(), unknown: v.unknown };
+        let finding = |(v, inferred): (&ViewReport, &f64)| PhotoFinding {
+            name: photos[v.photo].name.clone(),
+            unknown: v.unknown,
+            inferred: *inferred,
+        };
         SegmentationReport::new(
-            self.views.iter().map(name).collect(),
+            self.views.iter().zip(&self.inferred).map(finding).collect(),
             seen,
             self.conflicts.iter().filter_map(conflict).collect(),
         )
@@ -140,7 +146,7 @@ pub(crate) fn track(
     if seeds.len() > 1 {
         views = t.look(&t.decided(), observer)?;
     }
-    let said = t.votes.clone();
+    let (said, inferred) = (t.votes.clone(), views.iter().map(|v| v.unknown).collect());
     if options.by_photos {
         t.complete(&views, observer)?;
     }
@@ -173,7 +179,8 @@ pub(crate) fn track(
         ("follow masks", follow_secs),
         ("carry by Gaussians", carry_secs),
     ];
-    Ok(Tracked { identities: t.identities, assignments, seeds, views, conflicts: t.conflicts, masks: t.masks, secs })
+    let Tracker { identities, conflicts, masks, .. } = t;
+    Ok(Tracked { identities, assignments, seeds, views, inferred, conflicts, masks, secs })
 }
 
 /// Masks of a photo, and their identities.
