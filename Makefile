@@ -5,13 +5,18 @@ PROFILE ?= release
 # What `make run` passes on, for example `make run ARGS="train photos --out scene"`.
 ARGS ?=
 
-.PHONY: run test setup demo-asset
+.PHONY: run test bars setup demo-asset
 
 run:
 	@PROFILE='$(PROFILE)' tools/run.sh $(ARGS)
 
 test:
 	@tools/test.sh
+
+# Objects and parts in unseen views, compared with docs/results/bars.csv: about 20 minutes.
+bars:
+	@PROFILE=release tools/run.sh --version
+	@tools/bars.py
 
 # The trained demo that ships with the program (docs/guide.md).
 demo-asset:

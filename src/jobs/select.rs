@@ -10,7 +10,7 @@ use crate::io::{atomic, files};
 use crate::pipeline::cleaning::neighbors::SplatNeighbors;
 use crate::pipeline::observer::{Observer, Severity};
 use crate::pipeline::semantics::lifting::edit::{self, Edit};
-use crate::pipeline::semantics::lifting::splat_tree::hierarchy::Hierarchy;
+use crate::pipeline::semantics::lifting::splat_tree::hierarchy::{Hierarchy, MarkedSplats};
 pub use crate::pipeline::semantics::lifting::splat_tree::marks::Stroke;
 use crate::pipeline::semantics::lifting::splat_tree::marks::StrokeMarks;
 use crate::pipeline::semantics::lifting::splat_tree::stored;
@@ -109,6 +109,8 @@ pub struct Selected {
     neighbors: Option<Arc<SplatNeighbors>>,
     /// Indices of the selected Gaussians, ascending.
     pub(crate) gaussians: Vec<u32>,
+    /// True if a click was limited to what is near it, so that the rest stays as it was.
+    pub(crate) is_limited: bool,
     /// Objects and parts with the selection, and its identity among them; `NO_IDENTITY` if nothing is selected.
     pub(crate) preview: Arc<SemanticMap>,
     pub(crate) id: IdentityId,
@@ -157,12 +159,11 @@ pub(crate) fn run(request: &SelectRequest, observer: &mut dyn Observer) -> Resul
         None => (Marked { from: Arc::new(extent(map, purpose, cloud)), ..Marked::default() }, Vec::new(), None),
     };
     let hierarchy = prepared.as_ref().filter(|p| p.is_of(cloud)).map(|p| &*p.hierarchy);
-    let selected = |now: &Marked| -> Vec<bool> {
-        match hierarchy.filter(|_| now.marks.len() > 0) {
-            Some(hierarchy) => hierarchy.select(&now.marks, &now.from),
-            None => mask(cloud.len(), &now.from),
-        }
+    let marked = |now: &Marked| match hierarchy.filter(|_| now.marks.len() > 0) {
+        Some(hierarchy) => hierarchy.select(&now.marks, &now.from),
+        None => MarkedSplats { is_in: mask(cloud.len(), &now.from), is_limited: false },
     };
+    let selected = |now: &Marked| marked(now).is_in;
     let change = match step {
         SelectStep::Stroke(stroke) => {
             now.marks.add(&mut Renderer::new(), cloud, settings, stroke)?;
@@ -196,7 +197,7 @@ pub(crate) fn run(request: &SelectRequest, observer: &mut dyn Observer) -> Resul
         earlier.push(now);
         now = Marked { from: Arc::new((0..of.len()).filter(|i| of[*i]).collect()), ..Marked::default() };
     }
-    let of = selected(&now);
+    let MarkedSplats { is_in: of, is_limited } = marked(&now);
     let gaussians: Vec<u32> = (0..cloud.len() as u32).filter(|i| of[*i as usize]).collect();
     let (preview, id) = if gaussians.is_empty() {
         (Arc::clone(map), NO_IDENTITY)
@@ -208,7 +209,7 @@ pub(crate) fn run(request: &SelectRequest, observer: &mut dyn Observer) -> Resul
         };
         (Arc::new(preview), id)
     };
-    Ok(Selected { now, earlier, of: cloud.len(), neighbors, gaussians, preview, id })
+    Ok(Selected { now, earlier, of: cloud.len(), neighbors, gaussians, is_limited, preview, id })
 }
 
 /// Returns the Gaussians with which a selection begins, indices.

@@ -62,15 +62,12 @@ pub(crate) fn find_in(
         maker => maker?,
     };
     // The folder belongs to what was opened, whichever photos it gave.
-    let (out, is_own) = match &request.out {
-        Some(out) => (out.clone(), false),
-        None => (usual_out(&request.photos, folders), true),
-    };
+    let out = request.out.clone().unwrap_or_else(|| usual_out(&request.photos, folders));
     let photos = match &request.photos.video {
         Some(video) => source::photos_of(video, request.frames, observer)?,
         None => request.photos.clone(),
     };
-    find(&photos, &*maker, (&out, is_own), observer)
+    find(&photos, &*maker, &out, observer)
 }
 
 /// [`find_in`] the places of this process.

@@ -111,17 +111,17 @@ impl PoseWork<'_> {
     }
 }
 
-/// Finds the poses of photos with this maker, in `out`, which `is_own` if the program chose it. Steps that an earlier call finished there are not done again.
+/// Finds the poses of photos with this maker, in `out`. Steps that an earlier call finished there are not done again.
 ///
 /// # Errors
 /// If the maker fails or finds nothing, `out` holds something else, or the observer asks to stop.
 pub(crate) fn find(
     photos: &Unposed,
     maker: &dyn PoseMaker,
-    (out, is_own): (&Path, bool),
+    out: &Path,
     observer: &mut dyn Observer,
 ) -> Result<FoundPoses, JobError> {
-    check_out(photos, out, is_own)?;
+    check_out(photos, out)?;
     export::make_folder(out)?;
     let _lock = FolderLock::take(out, "camera poses")?;
     let mut state = PoseState::resume(photos, maker, out)?;
@@ -162,13 +162,13 @@ pub(crate) fn find(
     Ok(found)
 }
 
-/// Folder for the poses of photos that are given no other.
+/// Folder for the poses of photos that are given no other. Its own name is that of the photos, as a scene's title.
 pub(crate) fn usual_out(photos: &Unposed, folders: &Folders) -> PathBuf {
-    folders.poses(photos.video.as_deref().unwrap_or(&photos.folder))
+    folders.poses(photos.video.as_deref().unwrap_or(&photos.folder)).join(front_door::name_of(photos))
 }
 
 /// Refuses a folder that holds something else than poses of these photos.
-fn check_out(photos: &Unposed, out: &Path, is_own: bool) -> Result<(), JobError> {
+fn check_out(photos: &Unposed, out: &Path) -> Result<(), JobError> {
     let real = files::real(out);
     if real == files::real(&photos.folder) || real.join(IMAGES) == files::real(&photos.images) {
         return Err(JobError::Output(format!(
@@ -176,22 +176,13 @@ fn check_out(photos: &Unposed, out: &Path, is_own: bool) -> Result<(), JobError>
             out.display()
         )));
     }
-    // Earlier versions left no note, but worked in the program's own folders only; elsewhere it is somebody's work.
-    if files::holds_something(out) && !PoseState::is_in(out) && !(is_own && is_earlier(out)) {
+    if files::holds_something(out) && !PoseState::is_in(out) {
         return Err(JobError::Output(format!(
             "'{}' holds something else than camera poses that this program found; choose another folder",
             out.display()
         )));
     }
     Ok(())
-}
-
-/// True if an earlier version of this program left its work in a folder.
-fn is_earlier(out: &Path) -> bool {
-    let ours = [DATABASE, SPARSE, IMAGES];
-    let of_lock = |name: &String| name.starts_with('.');
-    files::names_in(out).is_ok_and(|names| names.iter().all(|n| ours.contains(&n.as_str()) || of_lock(n)))
-        && out.join(DATABASE).is_file()
 }
 
 /// Puts the photos into `out/images`; returns true if all have one size.

@@ -203,10 +203,11 @@ fn somebodys_own_colmap_project_is_no_place_for_poses() {
     let text = find_in(&request, &places, &folders, &mut Silent).expect_err("refused").to_string();
     assert!(text.contains("holds something else"), "{text}");
     assert_eq!(fs::read(project.join("images/mine.png")).expect("there"), b"mine");
-    // The control: the same in the program's own folder is the work of an earlier version.
+    // The control: a folder of the program's own, called like the photos.
     let own = usual_out(&fake.photos, &folders);
-    fs::create_dir_all(own.parent().expect("a folder")).and_then(|()| fs::rename(&project, &own)).expect("moved");
-    fake.find(&mut Silent).expect("found");
+    assert_eq!(files::data_set_name(&own), files::data_set_name(&fake.photos.folder));
+    find_in(&PoseRequest { out: None, ..request }, &places, &folders, &mut Silent).expect("found");
+    assert!(own.join("sparse/0").is_dir());
 }
 
 #[test]

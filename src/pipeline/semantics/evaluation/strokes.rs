@@ -98,7 +98,7 @@ pub(crate) fn rows(
             let start = std::time::Instant::now();
             let stroke = Stroke { camera: views[view].camera.clone(), pixels, is_plus };
             marks.add(&mut Renderer::new(), cloud, settings, &stroke)?;
-            selected = hierarchy.select(&marks, &from);
+            selected = hierarchy.select(&marks, &from).is_in;
             row.ms[k] = ms_since(start);
         }
         rows.extend(row);

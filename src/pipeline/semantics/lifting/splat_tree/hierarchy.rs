@@ -8,13 +8,22 @@ use crate::math::disjoint::root;
 use crate::pipeline::observer::Observer;
 use crate::pipeline::semantics::lifting::error::FindError;
 use crate::pipeline::semantics::lifting::regions::segment::unlike;
-use crate::pipeline::semantics::lifting::regions::tree::{Border, Node, Piece, Tree, grow};
+use crate::pipeline::semantics::lifting::regions::tree::{Border, Piece, Tree, grow};
 use crate::render::RenderSettings;
 use crate::scene::{Camera, GaussianCloud};
 
 /// Most Gaussians of a leaf, and their largest difference, in Lab steps.
 const LEAF: usize = 16;
-const LEAF_STEP: f64 = 3.0;
+pub(super) const LEAF_STEP: f64 = 3.0;
+
+/// Gaussians that marks select.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct MarkedSplats {
+    /// True for each selected Gaussian.
+    pub(crate) is_in: Vec<bool>,
+    /// True if a click could have changed more, and was limited to what is near it.
+    pub(crate) is_limited: bool,
+}
 
 /// Gaussians as a tree, whose leaves are a few that look the same.
 #[derive(Debug)]
@@ -65,7 +74,10 @@ impl Hierarchy {
     /// has each node with another label than its parent: less, the longer the node stood alone while the tree grew.
     /// Changed area costs by the square of the stroke's length, so that a stroke is about something of its own size.
     /// It costs least if a minus removes it, and little if a click adds it, since a click gives a place but no size.
-    pub(crate) fn select(&self, marks: &StrokeMarks, from: &[usize]) -> Vec<bool> {
+    ///
+    /// A click on a given selection changes no more than that selection's area, so that a small part does not grow
+    /// over all around it: the cost of area rises until it does.
+    pub(crate) fn select(&self, marks: &StrokeMarks, from: &[usize]) -> MarkedSplats {
         let mut gaussians = vec![false; self.leaf.len()];
         from.iter().for_each(|&i| gaussians[i] = true);
         let mut share = vec![[0_u32; 2]; self.leaves];
@@ -87,6 +99,11 @@ impl Hierarchy {
                 }
             }
         }
+        let area = |of: &dyn Fn(usize) -> bool| -> f64 {
+            (0..self.leaves).filter(|leaf| of(*leaf)).map(|leaf| self.tree.nodes[leaf].area).sum()
+        };
+        let known = area(&|leaf| before[leaf]);
+        let mut is_limited = false;
         let mut marked = vec![[0.0_f64; 2]; self.leaves];
         for (k, stroke) in marks.strokes.iter().enumerate() {
             let mut weights: BTreeMap<u32, f64> = BTreeMap::new();
@@ -102,20 +119,30 @@ impl Hierarchy {
                 // Of two opposite marks, the later one counts.
                 *follows = 0.0;
             }
-            let change = match stroke {
-                StrokeMark { is_click, .. } if !from.is_empty() => [if *is_click { KNOWN_BY_CLICK } else { KNOWN }; 2],
-                _ if k == 0 => [FIRST; 2],
-                StrokeMark { is_plus: false, .. } => [REMOVE, CHANGE],
-                StrokeMark { is_click: true, .. } => [CHANGE, ADD_BY_CLICK],
-                _ => [CHANGE; 2],
+            let changes: &[[f64; 2]] = match stroke {
+                StrokeMark { is_click: true, .. } if !from.is_empty() => &KNOWN_BY_CLICK.map(|c| [c; 2]),
+                _ if !from.is_empty() => &[[KNOWN; 2]],
+                _ if k == 0 => &[[FIRST; 2]],
+                StrokeMark { is_plus: false, .. } => &[[REMOVE, CHANGE]],
+                StrokeMark { is_click: true, .. } => &[[CHANGE, ADD_BY_CLICK]],
+                _ => &[[CHANGE; 2]],
             };
-            let change = change.map(|c| c / stroke.size.max(f64::MIN_POSITIVE));
-            let cost = |leaf: usize| {
-                let (mut cost, other) = (marked[leaf], usize::from(!now[leaf]));
-                cost[other] += change[other] * self.tree.nodes[leaf].area;
-                cost
+            let after = |change: &[f64; 2]| {
+                let change = change.map(|c| c / stroke.size.max(f64::MIN_POSITIVE));
+                let cost = |leaf: usize| {
+                    let (mut cost, other) = (marked[leaf], usize::from(!now[leaf]));
+                    cost[other] += change[other] * self.tree.nodes[leaf].area;
+                    cost
+                };
+                self.cheapest(&cost, &alone)
             };
-            let nodes = self.cheapest(&cost, &alone);
+            let mut nodes = after(&changes[0]);
+            for change in &changes[1..] {
+                if area(&|leaf| nodes[leaf] != now[leaf]) <= known.max(stroke.size) {
+                    break;
+                }
+                (nodes, is_limited) = (after(change), true);
+            }
             now = nodes[..self.leaves].to_vec();
         }
         for (is_in, leaf) in gaussians.iter_mut().zip(&self.leaf) {
@@ -125,38 +152,7 @@ impl Hierarchy {
                 *is_in = now[leaf];
             }
         }
-        gaussians
-    }
-
-    /// Cost of another label than the parent's.
-    pub(super) fn price(node: &Node) -> f64 {
-        ((node.birth + LEAF_STEP) / (node.death + LEAF_STEP)).powi(2)
-    }
-
-    /// Returns the cheapest labels of all nodes: `leaf` gives the costs of a leaf for being out and in, `alone` the
-    /// cost of each node for another label than its parent's.
-    fn cheapest(&self, leaf: &dyn Fn(usize) -> [f64; 2], alone: &[f64]) -> Vec<bool> {
-        let nodes = &self.tree.nodes;
-        let mut cost = vec![[0.0_f64; 2]; nodes.len()];
-        for (i, node) in nodes.iter().enumerate() {
-            let Some(children) = node.children else {
-                cost[i] = leaf(i);
-                continue;
-            };
-            for child in children.map(|c| c as usize) {
-                let [out, own] = cost[child];
-                cost[i][0] += out.min(own + alone[child]);
-                cost[i][1] += own.min(out + alone[child]);
-            }
-        }
-        let mut selected = vec![false; nodes.len()];
-        for i in (0..nodes.len()).rev() {
-            let of_selected = nodes[i].parent.is_some_and(|p| selected[p as usize]);
-            let mut of = cost[i];
-            of[usize::from(!of_selected)] += alone[i];
-            selected[i] = of[1] < of[0];
-        }
-        selected
+        MarkedSplats { is_in: gaussians, is_limited }
     }
 }
 
@@ -168,9 +164,9 @@ const CHANGE: f64 = 0.5;
 /// Cost of area that a minus removes, and that a click adds.
 const REMOVE: f64 = 0.05;
 const ADD_BY_CLICK: f64 = 0.1;
-/// Cost of area of a given selection that a line changes, and that a click changes.
+/// Cost of area of a given selection that a line changes, and that a click changes, from the first that is enough.
 const KNOWN: f64 = 16.0;
-const KNOWN_BY_CLICK: f64 = 0.1;
+const KNOWN_BY_CLICK: [f64; 5] = [0.1, 0.4, 1.6, 6.4, KNOWN];
 
 /// Groups Gaussians that look the same; returns the leaf of each, and the number of leaves.
 fn leaves(surface: &SplatSurface) -> (Vec<u32>, usize) {
@@ -278,7 +274,8 @@ pub(super) mod tests {
         let (cloud, whose) = sheet();
         let tree = hierarchy(&cloud);
         let [left, right, gray] = [[-0.15, 0.0], [0.15, 0.0], [-0.6, -0.6]];
-        let select = |strokes: &[Stroke], from: &[usize]| counts(&tree.select(&marks(&cloud, strokes), from), &whose);
+        let select =
+            |strokes: &[Stroke], from: &[usize]| counts(&tree.select(&marks(&cloud, strokes), from).is_in, &whose);
         // The rims of the three are of mixed colors; inside of them are 40, 40 and more of the gray.
         let one = select(&[dot(left, true)], &[]);
         let both = select(&[dot(left, true), dot(right, true)], &[]);
@@ -311,7 +308,7 @@ pub(super) mod tests {
             });
             all.expect("dots")
         };
-        let select = |stroke: &Stroke| tree.select(&marks(&cloud, std::slice::from_ref(stroke)), &from);
+        let select = |stroke: &Stroke| tree.select(&marks(&cloud, std::slice::from_ref(stroke)), &from).is_in;
         let without_blue = select(&line([0.15, -0.2], [0.15, 0.2], false));
         let [gray, red, blue] = counts(&without_blue, &whose);
         assert!(gray == 288 && red == 0 && (40..64).contains(&blue), "{gray} {red} {blue}");
@@ -323,8 +320,25 @@ pub(super) mod tests {
         let more = counts(&lower, &whose)[0] - 288;
         assert!((8..120).contains(&more), "{more} of the lower gray");
         // The control: from nothing, the same line selects the whole even area.
-        let alone = tree.select(&marks(&cloud, &[line([-0.6, 0.6], [0.0, 0.6], true)]), &[]);
+        let alone = tree.select(&marks(&cloud, &[line([-0.6, 0.6], [0.0, 0.6], true)]), &[]).is_in;
         assert!(counts(&alone, &whose)[0] > 400);
+    }
+
+    #[test]
+    fn a_click_beside_a_small_part_does_not_take_all_around_it() {
+        let (cloud, whose) = sheet();
+        let tree = hierarchy(&cloud);
+        // A corner of the gray, and a click on the gray beside it, on the upper left and far from its other borders.
+        let is_corner = |i: usize| i % 32 < 5 && i / 32 < 5;
+        let from: Vec<usize> = (0..whose.len()).filter(|i| is_corner(*i)).collect();
+        let click = marks(&cloud, &[dot([-0.5, -0.65], true)]);
+        let found = tree.select(&click, &from);
+        let added = (0..whose.len()).filter(|i| found.is_in[*i] && !is_corner(*i)).count();
+        assert!(added < 60, "{added}");
+        assert!(from.iter().all(|i| found.is_in[*i]), "what was known stays");
+        // The control: the same click takes most of the gray where nothing is known.
+        let alone = tree.select(&click, &[]);
+        assert!(counts(&alone.is_in, &whose)[0] > 400 && !alone.is_limited);
     }
 
     #[test]
@@ -332,15 +346,15 @@ pub(super) mod tests {
         let (cloud, whose) = sheet();
         let tree = hierarchy(&cloud);
         let mut all = marks(&cloud, &[dot([-0.15, 0.0], true), dot([0.15, 0.0], true)]);
-        let both = tree.select(&all, &[]);
-        assert_eq!(both, hierarchy(&cloud).select(&all, &[]));
+        let both = tree.select(&all, &[]).is_in;
+        assert_eq!(both, hierarchy(&cloud).select(&all, &[]).is_in);
         all.remove_last();
-        let one = tree.select(&all, &[]);
-        assert_eq!(one, tree.select(&marks(&cloud, &[dot([-0.15, 0.0], true)]), &[]));
+        let one = tree.select(&all, &[]).is_in;
+        assert_eq!(one, tree.select(&marks(&cloud, &[dot([-0.15, 0.0], true)]), &[]).is_in);
         assert_ne!(counts(&one, &whose), counts(&both, &whose));
         all.remove_last();
         all.remove_last();
-        assert_eq!((all.len(), counts(&tree.select(&all, &[]), &whose)), (0, [0; 3]));
+        assert_eq!((all.len(), counts(&tree.select(&all, &[]).is_in, &whose)), (0, [0; 3]));
     }
 
     #[test]
@@ -350,7 +364,7 @@ pub(super) mod tests {
             let cloud = GaussianCloud::isotropic(vec![[0.0; 3]; n], -2.0, 3.0);
             for cameras in [cameras(), Vec::new()] {
                 let tree = Hierarchy::new(&cloud, &cameras, &settings, &mut Silent).expect("made");
-                let selected = tree.select(&marks(&cloud, &[dot([0.0, 0.0], true)]), &[]);
+                let selected = tree.select(&marks(&cloud, &[dot([0.0, 0.0], true)]), &[]).is_in;
                 assert_eq!(selected.len(), n);
             }
         }
@@ -358,7 +372,7 @@ pub(super) mod tests {
         let mut cloud = GaussianCloud::isotropic(vec![[0.0; 3]; 40], -2.0, 3.0);
         cloud.positions[39] = [1e6, 0.0, 0.0];
         let tree = Hierarchy::new(&cloud, &cameras(), &settings, &mut Silent).expect("made");
-        let selected = tree.select(&marks(&cloud, &[dot([0.0, 0.0], true)]), &[]);
+        let selected = tree.select(&marks(&cloud, &[dot([0.0, 0.0], true)]), &[]).is_in;
         assert!(selected[..39].iter().any(|s| *s) && !selected[39]);
         let stopped = Hierarchy::new(&sheet().0, &cameras(), &settings, &mut StopsAfter::new(0)).expect_err("stopped");
         assert!(Interrupted::is_cause_of(&stopped), "{stopped}");

@@ -9,6 +9,7 @@
 //! Labels minimize a cost over the tree: votes of masks weigh more than photo edges (`tracker/complete.rs`). A click
 //! or stroke renders only the Gaussians near it.
 
+mod cheapest;
 pub(crate) mod hierarchy;
 mod labels;
 pub(crate) mod marks;

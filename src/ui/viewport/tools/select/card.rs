@@ -160,6 +160,9 @@ fn status(tool: &SelectTool, ui: &mut Ui, scene: &ToolScene<'_>, cx: &Ctx<'_>) {
         let text = taken.text(&cx.state.labels.full_name(all, taken.from));
         // What is cut is told on hover.
         ui.add(Label::new(RichText::new(text).color(theme::warning())).truncate());
+    } else if tool.selected.as_ref().is_some_and(|s| s.is_limited) {
+        let text = "Only near the click";
+        ui.weak(text).on_hover_text("The click could have changed much more of what is known. A line changes more.");
     }
 }
 
