@@ -118,7 +118,7 @@ fn show_next_photo(ui: &mut Ui, cx: &mut Ctx<'_>, next: Option<(&str, f64)>) {
     let Some((name, inferred)) = next else { return };
     let Some(place) = photos.and_then(|photos| photos.iter().position(|p| p.name == name)) else { return };
     let file = text::elided(name.rsplit('/').next().unwrap_or_default(), 40);
-    let link = ui.link(format!("{} of {file} is inferred", format::percent(inferred)));
+    let link = ui.link(format!("Label {file} next: {} of it is inferred", format::percent(inferred)));
     let why = "No mask shows it. Labels of this photo would tell most. Click to go there";
     if link.on_hover_text(why).clicked() {
         cx.ask(Action::GoToPhoto(place));
