@@ -13,7 +13,7 @@ run:
 test:
 	@tools/test.sh
 
-# Objects and parts in unseen views, compared with docs/results/bars.csv: about 20 minutes.
+# Objects and parts in unseen views, compared with docs/results/bars.csv.
 bars:
 	@PROFILE=release tools/run.sh --version
 	@tools/bars.py

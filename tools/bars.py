@@ -5,8 +5,8 @@ usage: tools/bars.py [--program PATH] [--out DIR] [--keep] [--write] [NAME...]
 
 Trains each scene, finds its objects from one photo's labels, and compares all names with the labels of other views
 (`fmlgs eval --protocol limits`). Fails if objects or parts are more than 0.01 below docs/results/bars.csv.
---keep takes scenes that an earlier run trained; --write writes their rows of the table. `make bars` builds and runs all, in about
-20 minutes on two cores.
+Scenes without a row there are told, not compared. --keep takes scenes that an earlier run trained; --write writes
+their rows. `make bars` builds the program and runs all.
 """
 
 import argparse
@@ -27,26 +27,28 @@ TABLE = ROOT / "docs/results/bars.csv"
 ORIGIN = "# tools/bars.py --write; two CPU cores without a GPU; mean IoU of names in unseen views, one labeled photo; limit: true labels of all views with the same Gaussians; recorded "
 COLUMNS = ["scene", "objects", "parts", "large_parts", "objects_limit", "parts_limit", "large_parts_limit"]
 LARGEST_FALL = 0.01
-ROWS = {"objects": "objects", "parts": "parts", "large parts": "large_parts"}
+KINDS = ["objects", "parts", "large parts"]
+# File in the folders that this tool may replace.
+MARK = ".bars"
 RENDERED = ["--size", "400x300", "--view-count", "48", "--samples", "2"]
 
 
 def rendered(path):
-    """Photos of a glTF scene, with the ids of every pixel as labels."""
-    return lambda run, folder: (run("synth", path, "--out", folder / "photos", *RENDERED), folder / "photos")[1]
+    """Renders photos of a glTF scene, with the ids of every pixel as labels."""
+    return lambda run, folder: run("synth", path, "--out", folder / "photos", *RENDERED)
 
 
 def demo(_, folder):
-    """Photos of the demo that ships with the program."""
+    """Unpacks the photos of the demo that ships with the program."""
     with zipfile.ZipFile(ROOT / "assets/demo/demo.zip") as archive:
         archive.extractall(folder, [n for n in archive.namelist() if n.startswith("photos/")])
-    return folder / "photos"
 
 
 GLTF = DATA / "gltf"
-# Photos; labels of one photo and of the others, None = the photos' own; options of training and of evaluation.
+# Photos, or how they are made; labels of one photo and of the others, None = the photos' own; longer side, steps;
+# options of evaluation.
 SCENES = {
-    "plush": (lambda *_: DATA / "plush", DATA / "plush_labels/seed", ROOT / "tests/data/plush_labels", "378", "1000", ["--held-out-every", "0"]),
+    "plush": (DATA / "plush", DATA / "plush_labels/seed", ROOT / "tests/data/plush_labels", "378", "1000", ["--held-out-every", "0"]),
     "demo": (demo, None, None, "400", "1000", []),
     "desk": (rendered(ROOT / "assets/eval/desk.glb"), None, None, "400", "800", []),
     "kitchen": (rendered(ROOT / "assets/eval/kitchen.glb"), None, None, "400", "800", []),
@@ -61,9 +63,10 @@ REAL = {"plush", "truck", "motorcycle", "chair"}
 
 
 def measure(name, program, out, keep):
-    """Row of the table; None if the scene's photos are not here."""
-    photos_of, seed, labels, side, steps, options = SCENES[name]
+    """Row of the table."""
+    source, seed, labels, side, steps, options = SCENES[name]
     folder = out / name
+    photos = folder / "photos" if callable(source) else source
 
     def run(*args):
         done = subprocess.run([program, "-q", *map(str, args)], capture_output=True, text=True)
@@ -73,22 +76,35 @@ def measure(name, program, out, keep):
 
     scene = folder / "scene"
     if not (keep and (scene / "point_cloud.ply").exists()):
-        shutil.rmtree(folder, ignore_errors=True)
+        if folder.exists():
+            if not (folder / MARK).exists():
+                sys.exit(f"{folder} is not of an earlier run; choose another --out")
+            shutil.rmtree(folder)
         folder.mkdir(parents=True)
-        photos = photos_of(run, folder)
+        (folder / MARK).touch()
+        if callable(source):
+            source(run, folder)
         run("train", photos, "--out", scene, "--max-side", side, "--steps", steps, "--eval-every", "0")
-    photos = folder / "photos" if (folder / "photos").exists() else DATA / name
     run("preprocess", scene, "--masks", seed or photos, "--max-seeds", "1", "--encoder", "none", "--replace-all")
     scores = run("eval", scene, "--masks", labels or photos, "--protocol", "limits", "--json", *options)
     rows = {row["labels"]: row for row in json.loads(scores)["rows"]}
     value = lambda kind, key: f"{key(rows[kind]):.3f}" if kind in rows else ""
-    return [name, *(value(k, lambda r: r["iou"]) for k in ROWS), *(value(k, lambda r: r["limits"][0]) for k in ROWS)]
+    return [name, *(value(k, lambda r: r["iou"]) for k in KINDS), *(value(k, lambda r: r["limits"][0]) for k in KINDS)]
 
 
 def falls(row, known):
     """What is worse than in the table, in words."""
     pairs = [(c, float(n), float(k)) for c, n, k in zip(COLUMNS[1:4], row[1:4], known[1:4]) if n and k]
     return [f"{c} {n:.3f}, {k:.3f} before" for c, n, k in pairs if n < k - LARGEST_FALL]
+
+
+def write(known):
+    """Writes the table, whole or not at all."""
+    rows = [known[name] for name in SCENES if name in known]
+    lines = [ORIGIN + datetime.date.today().isoformat(), ",".join(COLUMNS), *(",".join(row) for row in rows)]
+    new = TABLE.with_suffix(".tmp")
+    new.write_text("\n".join(lines) + "\n")
+    new.replace(TABLE)
 
 
 def main():
@@ -112,13 +128,13 @@ def main():
         row = measure(name, args.program, args.out, args.keep)
         print(",".join([*row, f"{time.monotonic() - started:.0f}"]), flush=True)
         if args.write:
+            # Each row at once, so that a stop loses one scene.
             known[name] = row
+            write(known)
+        elif name in known:
+            bad += [f"{name}: {text}" for text in falls(row, known[name])]
         else:
-            bad += [f"{name}: {text}" for text in (falls(row, known[name]) if name in known else [])]
-    if args.write:
-        rows = [known[name] for name in SCENES if name in known]
-        lines = [ORIGIN + datetime.date.today().isoformat(), ",".join(COLUMNS), *(",".join(row) for row in rows)]
-        TABLE.write_text("\n".join(lines) + "\n")
+            print(f"not compared: {name} has no row in {TABLE.name}", flush=True)
     if bad:
         sys.exit("worse than docs/results/bars.csv:\n" + "\n".join(bad))
 
