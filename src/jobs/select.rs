@@ -10,7 +10,7 @@ use crate::io::{atomic, files};
 use crate::pipeline::cleaning::neighbors::SplatNeighbors;
 use crate::pipeline::observer::{Observer, Severity};
 use crate::pipeline::semantics::lifting::edit::{self, Edit};
-use crate::pipeline::semantics::lifting::splat_tree::hierarchy::{Hierarchy, MarkedSplats};
+use crate::pipeline::semantics::lifting::splat_tree::hierarchy::{CorrectedSplats, Hierarchy};
 pub use crate::pipeline::semantics::lifting::splat_tree::marks::Stroke;
 use crate::pipeline::semantics::lifting::splat_tree::marks::StrokeMarks;
 use crate::pipeline::semantics::lifting::splat_tree::stored;
@@ -109,7 +109,7 @@ pub struct Selected {
     neighbors: Option<Arc<SplatNeighbors>>,
     /// Indices of the selected Gaussians, ascending.
     pub(crate) gaussians: Vec<u32>,
-    /// True if a click was limited to what is near it, so that the rest stays as it was.
+    /// True if the last click on something known was kept from changing more.
     pub(crate) is_limited: bool,
     /// Objects and parts with the selection, and its identity among them; `NO_IDENTITY` if nothing is selected.
     pub(crate) preview: Arc<SemanticMap>,
@@ -159,11 +159,12 @@ pub(crate) fn run(request: &SelectRequest, observer: &mut dyn Observer) -> Resul
         None => (Marked { from: Arc::new(extent(map, purpose, cloud)), ..Marked::default() }, Vec::new(), None),
     };
     let hierarchy = prepared.as_ref().filter(|p| p.is_of(cloud)).map(|p| &*p.hierarchy);
-    let marked = |now: &Marked| match hierarchy.filter(|_| now.marks.len() > 0) {
-        Some(hierarchy) => hierarchy.select(&now.marks, &now.from),
-        None => MarkedSplats { is_in: mask(cloud.len(), &now.from), is_limited: false },
+    let corrected = |now: &Marked| match (hierarchy.filter(|_| now.marks.len() > 0), purpose) {
+        (Some(hierarchy), SelectFor::Extent(_)) => hierarchy.correct(&now.marks, &now.from),
+        (Some(hierarchy), SelectFor::New(_)) => CorrectedSplats::new(hierarchy.select(&now.marks, &now.from)),
+        (None, _) => CorrectedSplats::new(mask(cloud.len(), &now.from)),
     };
-    let selected = |now: &Marked| marked(now).is_in;
+    let selected = |now: &Marked| corrected(now).is_in;
     let change = match step {
         SelectStep::Stroke(stroke) => {
             now.marks.add(&mut Renderer::new(), cloud, settings, stroke)?;
@@ -197,7 +198,7 @@ pub(crate) fn run(request: &SelectRequest, observer: &mut dyn Observer) -> Resul
         earlier.push(now);
         now = Marked { from: Arc::new((0..of.len()).filter(|i| of[*i]).collect()), ..Marked::default() };
     }
-    let MarkedSplats { is_in: of, is_limited } = marked(&now);
+    let CorrectedSplats { is_in: of, is_limited } = corrected(&now);
     let gaussians: Vec<u32> = (0..cloud.len() as u32).filter(|i| of[*i as usize]).collect();
     let (preview, id) = if gaussians.is_empty() {
         (Arc::clone(map), NO_IDENTITY)

@@ -20,7 +20,7 @@ pub(crate) const SIZES: [u32; 3] = [1, 2, 4];
 /// Distance from a label's border up to which nobody can say who is right, px.
 const RIM_PX: usize = 2;
 /// Area from which a label counts as large, px.
-pub(crate) const LARGE_PX: usize = 100;
+const LARGE_PX: usize = 100;
 
 /// Cause of a wrong pixel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, VariantArray, strum::IntoStaticStr, serde::Serialize)]

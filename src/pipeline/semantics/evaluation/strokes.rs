@@ -98,7 +98,10 @@ pub(crate) fn rows(
             let start = std::time::Instant::now();
             let stroke = Stroke { camera: views[view].camera.clone(), pixels, is_plus };
             marks.add(&mut Renderer::new(), cloud, settings, &stroke)?;
-            selected = hierarchy.select(&marks, &from).is_in;
+            selected = match known {
+                Some(_) => hierarchy.correct(&marks, &from).is_in,
+                None => hierarchy.select(&marks, &from),
+            };
             row.ms[k] = ms_since(start);
         }
         rows.extend(row);

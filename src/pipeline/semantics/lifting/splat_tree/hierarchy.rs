@@ -16,13 +16,20 @@ use crate::scene::{Camera, GaussianCloud};
 const LEAF: usize = 16;
 pub(super) const LEAF_STEP: f64 = 3.0;
 
-/// Gaussians that marks select.
+/// Corrected Gaussians of something known.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) struct MarkedSplats {
-    /// True for each selected Gaussian.
+pub(crate) struct CorrectedSplats {
+    /// True for each of its Gaussians.
     pub(crate) is_in: Vec<bool>,
-    /// True if a click could have changed more, and was limited to what is near it.
+    /// True if the last mark is a click that was kept from changing more.
     pub(crate) is_limited: bool,
+}
+
+impl CorrectedSplats {
+    /// Gaussians that nothing limited.
+    pub(crate) fn new(is_in: Vec<bool>) -> Self {
+        Self { is_in, is_limited: false }
+    }
 }
 
 /// Gaussians as a tree, whose leaves are a few that look the same.
@@ -74,10 +81,19 @@ impl Hierarchy {
     /// has each node with another label than its parent: less, the longer the node stood alone while the tree grew.
     /// Changed area costs by the square of the stroke's length, so that a stroke is about something of its own size.
     /// It costs least if a minus removes it, and little if a click adds it, since a click gives a place but no size.
-    ///
-    /// A click on a given selection changes no more than that selection's area, so that a small part does not grow
-    /// over all around it: the cost of area rises until it does.
-    pub(crate) fn select(&self, marks: &StrokeMarks, from: &[usize]) -> MarkedSplats {
+    pub(crate) fn select(&self, marks: &StrokeMarks, from: &[usize]) -> Vec<bool> {
+        self.marked(marks, from, &[KNOWN_BY_CLICK]).is_in
+    }
+
+    /// Returns the Gaussians of something known, `from`, as marks correct it. The cost of area rises while a click
+    /// changes more than all of it and more than a click is about, so that a small part does not grow over all around
+    /// it.
+    pub(crate) fn correct(&self, marks: &StrokeMarks, from: &[usize]) -> CorrectedSplats {
+        self.marked(marks, from, &CORRECTED_BY_CLICK)
+    }
+
+    /// `by_click` are the costs of area of a given selection that a click changes, from the first that is enough.
+    fn marked(&self, marks: &StrokeMarks, from: &[usize], by_click: &[f64]) -> CorrectedSplats {
         let mut gaussians = vec![false; self.leaf.len()];
         from.iter().for_each(|&i| gaussians[i] = true);
         let mut share = vec![[0_u32; 2]; self.leaves];
@@ -119,15 +135,14 @@ impl Hierarchy {
                 // Of two opposite marks, the later one counts.
                 *follows = 0.0;
             }
-            let changes: &[[f64; 2]] = match stroke {
-                StrokeMark { is_click: true, .. } if !from.is_empty() => &KNOWN_BY_CLICK.map(|c| [c; 2]),
-                _ if !from.is_empty() => &[[KNOWN; 2]],
-                _ if k == 0 => &[[FIRST; 2]],
-                StrokeMark { is_plus: false, .. } => &[[REMOVE, CHANGE]],
-                StrokeMark { is_click: true, .. } => &[[CHANGE, ADD_BY_CLICK]],
-                _ => &[[CHANGE; 2]],
+            let change = match stroke {
+                StrokeMark { is_click, .. } if !from.is_empty() => [if *is_click { by_click[0] } else { KNOWN }; 2],
+                _ if k == 0 => [FIRST; 2],
+                StrokeMark { is_plus: false, .. } => [REMOVE, CHANGE],
+                StrokeMark { is_click: true, .. } => [CHANGE, ADD_BY_CLICK],
+                _ => [CHANGE; 2],
             };
-            let after = |change: &[f64; 2]| {
+            let after = |change: [f64; 2]| {
                 let change = change.map(|c| c / stroke.size.max(f64::MIN_POSITIVE));
                 let cost = |leaf: usize| {
                     let (mut cost, other) = (marked[leaf], usize::from(!now[leaf]));
@@ -136,12 +151,13 @@ impl Hierarchy {
                 };
                 self.cheapest(&cost, &alone)
             };
-            let mut nodes = after(&changes[0]);
-            for change in &changes[1..] {
+            let mut nodes = after(change);
+            is_limited = false;
+            for dearer in by_click[1..].iter().filter(|_| stroke.is_click) {
                 if area(&|leaf| nodes[leaf] != now[leaf]) <= known.max(stroke.size) {
                     break;
                 }
-                (nodes, is_limited) = (after(change), true);
+                (nodes, is_limited) = (after([*dearer; 2]), true);
             }
             now = nodes[..self.leaves].to_vec();
         }
@@ -152,7 +168,7 @@ impl Hierarchy {
                 *is_in = now[leaf];
             }
         }
-        MarkedSplats { is_in: gaussians, is_limited }
+        CorrectedSplats { is_in: gaussians, is_limited }
     }
 }
 
@@ -164,9 +180,11 @@ const CHANGE: f64 = 0.5;
 /// Cost of area that a minus removes, and that a click adds.
 const REMOVE: f64 = 0.05;
 const ADD_BY_CLICK: f64 = 0.1;
-/// Cost of area of a given selection that a line changes, and that a click changes, from the first that is enough.
+/// Cost of area of a given selection that a line changes, and that a click changes.
 const KNOWN: f64 = 16.0;
-const KNOWN_BY_CLICK: [f64; 5] = [0.1, 0.4, 1.6, 6.4, KNOWN];
+const KNOWN_BY_CLICK: f64 = 0.1;
+/// The same for a click that corrects something known, from the first that is enough.
+const CORRECTED_BY_CLICK: [f64; 5] = [KNOWN_BY_CLICK, 0.4, 1.6, 6.4, KNOWN];
 
 /// Groups Gaussians that look the same; returns the leaf of each, and the number of leaves.
 fn leaves(surface: &SplatSurface) -> (Vec<u32>, usize) {
@@ -274,8 +292,7 @@ pub(super) mod tests {
         let (cloud, whose) = sheet();
         let tree = hierarchy(&cloud);
         let [left, right, gray] = [[-0.15, 0.0], [0.15, 0.0], [-0.6, -0.6]];
-        let select =
-            |strokes: &[Stroke], from: &[usize]| counts(&tree.select(&marks(&cloud, strokes), from).is_in, &whose);
+        let select = |strokes: &[Stroke], from: &[usize]| counts(&tree.select(&marks(&cloud, strokes), from), &whose);
         // The rims of the three are of mixed colors; inside of them are 40, 40 and more of the gray.
         let one = select(&[dot(left, true)], &[]);
         let both = select(&[dot(left, true), dot(right, true)], &[]);
@@ -308,7 +325,7 @@ pub(super) mod tests {
             });
             all.expect("dots")
         };
-        let select = |stroke: &Stroke| tree.select(&marks(&cloud, std::slice::from_ref(stroke)), &from).is_in;
+        let select = |stroke: &Stroke| tree.select(&marks(&cloud, std::slice::from_ref(stroke)), &from);
         let without_blue = select(&line([0.15, -0.2], [0.15, 0.2], false));
         let [gray, red, blue] = counts(&without_blue, &whose);
         assert!(gray == 288 && red == 0 && (40..64).contains(&blue), "{gray} {red} {blue}");
@@ -320,7 +337,7 @@ pub(super) mod tests {
         let more = counts(&lower, &whose)[0] - 288;
         assert!((8..120).contains(&more), "{more} of the lower gray");
         // The control: from nothing, the same line selects the whole even area.
-        let alone = tree.select(&marks(&cloud, &[line([-0.6, 0.6], [0.0, 0.6], true)]), &[]).is_in;
+        let alone = tree.select(&marks(&cloud, &[line([-0.6, 0.6], [0.0, 0.6], true)]), &[]);
         assert!(counts(&alone, &whose)[0] > 400);
     }
 
@@ -332,13 +349,12 @@ pub(super) mod tests {
         let is_corner = |i: usize| i % 32 < 5 && i / 32 < 5;
         let from: Vec<usize> = (0..whose.len()).filter(|i| is_corner(*i)).collect();
         let click = marks(&cloud, &[dot([-0.5, -0.65], true)]);
-        let found = tree.select(&click, &from);
-        let added = (0..whose.len()).filter(|i| found.is_in[*i] && !is_corner(*i)).count();
-        assert!(added < 60, "{added}");
+        let found = tree.correct(&click, &from);
+        let added = |of: &[bool]| (0..whose.len()).filter(|i| of[*i] && !is_corner(*i)).count();
+        let (few, all) = (added(&found.is_in), added(&tree.select(&click, &from)));
+        assert!(few < 60 && found.is_limited, "{few}");
         assert!(from.iter().all(|i| found.is_in[*i]), "what was known stays");
-        // The control: the same click takes most of the gray where nothing is known.
-        let alone = tree.select(&click, &[]);
-        assert!(counts(&alone.is_in, &whose)[0] > 400 && !alone.is_limited);
+        assert!(few < all, "the control, of what is only given: {few} of {all}");
     }
 
     #[test]
@@ -346,15 +362,15 @@ pub(super) mod tests {
         let (cloud, whose) = sheet();
         let tree = hierarchy(&cloud);
         let mut all = marks(&cloud, &[dot([-0.15, 0.0], true), dot([0.15, 0.0], true)]);
-        let both = tree.select(&all, &[]).is_in;
-        assert_eq!(both, hierarchy(&cloud).select(&all, &[]).is_in);
+        let both = tree.select(&all, &[]);
+        assert_eq!(both, hierarchy(&cloud).select(&all, &[]));
         all.remove_last();
-        let one = tree.select(&all, &[]).is_in;
-        assert_eq!(one, tree.select(&marks(&cloud, &[dot([-0.15, 0.0], true)]), &[]).is_in);
+        let one = tree.select(&all, &[]);
+        assert_eq!(one, tree.select(&marks(&cloud, &[dot([-0.15, 0.0], true)]), &[]));
         assert_ne!(counts(&one, &whose), counts(&both, &whose));
         all.remove_last();
         all.remove_last();
-        assert_eq!((all.len(), counts(&tree.select(&all, &[]).is_in, &whose)), (0, [0; 3]));
+        assert_eq!((all.len(), counts(&tree.select(&all, &[]), &whose)), (0, [0; 3]));
     }
 
     #[test]
@@ -364,7 +380,7 @@ pub(super) mod tests {
             let cloud = GaussianCloud::isotropic(vec![[0.0; 3]; n], -2.0, 3.0);
             for cameras in [cameras(), Vec::new()] {
                 let tree = Hierarchy::new(&cloud, &cameras, &settings, &mut Silent).expect("made");
-                let selected = tree.select(&marks(&cloud, &[dot([0.0, 0.0], true)]), &[]).is_in;
+                let selected = tree.select(&marks(&cloud, &[dot([0.0, 0.0], true)]), &[]);
                 assert_eq!(selected.len(), n);
             }
         }
@@ -372,7 +388,7 @@ pub(super) mod tests {
         let mut cloud = GaussianCloud::isotropic(vec![[0.0; 3]; 40], -2.0, 3.0);
         cloud.positions[39] = [1e6, 0.0, 0.0];
         let tree = Hierarchy::new(&cloud, &cameras(), &settings, &mut Silent).expect("made");
-        let selected = tree.select(&marks(&cloud, &[dot([0.0, 0.0], true)]), &[]).is_in;
+        let selected = tree.select(&marks(&cloud, &[dot([0.0, 0.0], true)]), &[]);
         assert!(selected[..39].iter().any(|s| *s) && !selected[39]);
         let stopped = Hierarchy::new(&sheet().0, &cameras(), &settings, &mut StopsAfter::new(0)).expect_err("stopped");
         assert!(Interrupted::is_cause_of(&stopped), "{stopped}");
