@@ -216,6 +216,7 @@ pub(super) fn identities(map: &SemanticMap) -> Vec<Value> {
             "gaussians": fact.gaussians,
             "photos": fact.photos,
             "confidence": fact.confidence,
+            "guessed": fact.guessed,
             "doubts": fact.conflicts.iter().map(|k| &found[*k]).collect::<Vec<_>>(),
         })
     };

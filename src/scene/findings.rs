@@ -127,6 +127,9 @@ pub(crate) struct Seen {
     pixels: u64,
     /// Mean share of its object in them, 0 to 1.
     confidence: f64,
+    /// Gaussians that it has by a guess from its mirror image.
+    #[serde(default)]
+    pub(crate) guessed: u64,
 }
 
 impl Seen {
@@ -134,7 +137,7 @@ impl Seen {
     pub(crate) fn add(&mut self, photo: usize, pixels: u64, confidence: f64) {
         let mut bits = vec![0; photo / 32 + 1];
         bits[photo / 32] = 1 << (photo % 32);
-        self.join(&Self { photos: bits, pixels, confidence });
+        self.join(&Self { photos: bits, pixels, confidence, guessed: 0 });
     }
 
     fn join(&mut self, other: &Self) {
@@ -143,6 +146,7 @@ impl Seen {
         }
         self.photos.iter_mut().zip(&other.photos).for_each(|(bits, more)| *bits |= more);
         let sum = self.confidence * self.pixels as f64 + other.confidence * other.pixels as f64;
+        self.guessed += other.guessed;
         self.pixels += other.pixels;
         self.confidence = sum / self.pixels.max(1) as f64;
     }
@@ -167,6 +171,7 @@ pub(crate) struct IdentityEvidence {
     pub(crate) photos: Option<usize>,
     /// Mean share of its object in its pixels, if that is known.
     pub(crate) confidence: Option<f64>,
+    pub(crate) guessed: u64,
     /// Places in [`SegmentationReport::conflicts`].
     pub(crate) conflicts: Vec<usize>,
 }
@@ -264,7 +269,7 @@ impl SegmentationReport {
         }
         for (fact, seen) in facts.iter_mut().zip(&seen).filter(|(_, seen)| seen.pixels > 0) {
             fact.photos = Some(seen.photos.iter().map(|bits| bits.count_ones() as usize).sum());
-            fact.confidence = Some(seen.confidence);
+            (fact.confidence, fact.guessed) = (Some(seen.confidence), seen.guessed);
         }
         for (k, conflict) in findings.conflicts.iter().enumerate() {
             for id in conflict.what.about() {

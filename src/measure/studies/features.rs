@@ -141,6 +141,7 @@ fn variants(views: usize, steps: &[u64]) -> Variants<Variant> {
     };
     with("growth in photos", ("by_photos", json!(false)), TrackOptions { by_photos: false, ..one.clone() });
     with("tree", ("by_tree", json!(false)), TrackOptions { by_tree: false, ..one.clone() });
+    with("mirror images", ("by_mirror", json!(false)), TrackOptions { by_mirror: false, ..one.clone() });
     let neither = TrackOptions { by_photos: false, by_tree: false, ..one.clone() };
     with("both", ("spread", json!(false)), neither);
     for share in [0.0, 0.03, 0.3] {

@@ -143,7 +143,11 @@ impl<'a> RowFacts<'a> {
     pub(super) fn line(&self, id: IdentityId) -> Option<String> {
         let fact = self.of(id)?;
         let (seen, of) = (fact.photos?, self.findings?.photos.len());
-        Some(format!("Seen in {seen} of {}, {} of its pixels are its own.", things(of, "photo"), sure(fact)))
+        let guessed = match fact.guessed {
+            0 => String::new(),
+            n => format!(" {} of its Gaussians are guessed from its mirror image.", format::count(n)),
+        };
+        Some(format!("Seen in {seen} of {}, {} of its pixels are its own.{guessed}", things(of, "photo"), sure(fact)))
     }
 
     /// Draws a sign on a row with doubts. A click on a doubt opens its photo and selects its identity.
@@ -215,6 +219,7 @@ mod tests {
             gaussians,
             photos,
             confidence: photos.map(|n| 0.1 * n as f64),
+            guessed: 4 * photos.unwrap_or(0) as u64 / 3,
             conflicts: (0..conflicts).collect(),
         };
         let facts = [fact(9, None, 0), fact(5, Some(3), 0), fact(7, None, 2), fact(6, Some(8), 1)];
@@ -229,6 +234,9 @@ mod tests {
                 dataset: None,
                 order,
             };
+            let lines =
+                [1, 2, 3].map(|id| rows.line(id).is_some_and(|text| text.contains("guessed from its mirror image")));
+            assert_eq!(lines, [true, false, true], "nothing is known of the second, and nothing guessed");
             let mut ids = [1, 2, 3];
             rows.sort(&mut ids);
             (ids, rows.number(2).0)

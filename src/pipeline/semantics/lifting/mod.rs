@@ -7,7 +7,7 @@
 //!    even color. [`filters`] sort masks into objects and parts.
 //! 2. [`tracker`] makes masks identities over all views: by the Gaussians, or by [`sam2_tracker`] from photo to photo.
 //! 3. [`votes`] give every Gaussian its identity; [`splat_tree`] labels Gaussians without votes by the things that they
-//!    belong to.
+//!    belong to, [`mirror`] by the other side of these.
 //! 4. [`codes`] give every identity its point in code space; [`train_codes`] trains the codes of Gaussians instead, as
 //!    in the paper.
 //! 5. [`embed`] gives every identity its embedding; [`mask_vectors`] takes it from vectors that came with the masks.
@@ -30,6 +30,7 @@ pub mod frame_cache;
 pub(crate) mod keep;
 pub(crate) mod mask_cache;
 mod mask_vectors;
+mod mirror;
 mod nearest;
 pub(crate) mod network_segmenter;
 mod prompt_points;

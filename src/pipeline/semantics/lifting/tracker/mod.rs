@@ -15,6 +15,7 @@ pub(crate) use views::ViewReport;
 use super::associate::{Link, conflicts, link};
 use super::error::FindError;
 use super::floaters::drop_floaters;
+use super::mirror::guess;
 use super::propagate::extend;
 use super::removed::RemovedThings;
 use super::sam2_tracker::{LABEL_SIDE_PX, Sam2Tracker};
@@ -54,6 +55,8 @@ pub(crate) struct Tracked {
     pub(crate) conflicts: Vec<(usize, ConflictKind)>,
     /// The masks of the photos that were segmented and of those to which they were followed.
     pub(crate) masks: Vec<CodeView>,
+    /// Numbers of Gaussians that are guessed from mirror images.
+    pub(crate) guessed: Vec<(IdentityId, usize)>,
     /// Seconds that each stage took, in order.
     pub(crate) secs: Vec<(&'static str, f64)>,
 }
@@ -67,6 +70,7 @@ impl Tracked {
                 seen[s.identity as usize - 1].add(k, s.pixels as u64, s.confidence);
             }
         }
+        self.guessed.iter().for_each(|(id, n)| seen[*id as usize - 1].guessed = *n as u64);
         let place = |photo: usize| self.views.iter().position(|v| v.photo == photo);
         let conflict = |(photo, what): &(usize, ConflictKind)| {
             place(*photo).map(|k| MaskConflict { photo: k as u32, what: what.clone() })
@@ -159,6 +163,8 @@ pub(crate) fn track(
         t.votes.decide(&t.identities, LEAST_VOTES)
     };
     let views = t.look(&identities_of(&assignments), observer)?;
+    let guessed =
+        if options.by_mirror { guess(cloud, &t.identities, &said, &mut assignments, observer)? } else { Vec::new() };
     extend(cloud, &mut assignments, options.hidden_steps);
     drop_floaters(cloud, &t.identities, &mut assignments);
     if let Some(map) = &options.known {
@@ -180,7 +186,7 @@ pub(crate) fn track(
         ("carry by Gaussians", carry_secs),
     ];
     let Tracker { identities, conflicts, masks, .. } = t;
-    Ok(Tracked { identities, assignments, seeds, views, inferred, conflicts, masks, secs })
+    Ok(Tracked { identities, assignments, seeds, views, inferred, conflicts, masks, guessed, secs })
 }
 
 /// Masks of a photo, and their identities.

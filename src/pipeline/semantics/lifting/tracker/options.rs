@@ -26,6 +26,8 @@ pub(crate) struct TrackOptions {
     pub(crate) by_photos: bool,
     /// True if Gaussians that look alike and lie side by side share the votes for some of them.
     pub(crate) by_tree: bool,
+    /// True if sides that no mask shows are guessed from the mirror image of those that one does.
+    pub(crate) by_mirror: bool,
     /// Steps between Gaussians over which unseen ones (the inside of things) inherit from those around them.
     pub(crate) hidden_steps: f64,
     /// Least share of its area in its best photo for a Gaussian to be voted on in a photo.
@@ -50,6 +52,7 @@ impl Default for TrackOptions {
             prompt: MaskPrompt::Mask,
             by_photos: true,
             by_tree: true,
+            by_mirror: true,
             hidden_steps: 4.0,
             least_seen: LEAST_SEEN,
             known: None,
