@@ -37,7 +37,7 @@ const LEAST_SHARE: f64 = 0.7;
 /// Distance beyond which nothing is alike, in lengths of [`Comparison::near`].
 const REACH: f64 = 3.0;
 
-/// How closely a thing is compared with its mirror image.
+/// Scale and effort of a comparison with the mirror image.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Comparison {
     /// Gaussians that are compared.
