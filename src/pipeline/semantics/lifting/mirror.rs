@@ -227,10 +227,6 @@ impl<'a> Thing<'a> {
         };
         let mut tried: Vec<_> = (0..DIRECTIONS).into_par_iter().map(|k| through(direction(k), 0.0, COARSE)).collect();
         tried.sort_by(|a, b| more(b, a));
-        let is_enough = |likeness: f64, how| likeness >= LEAST_LIKENESS * self.mean_likeness(|p| p, how);
-        if !is_enough(tried[0].1, COARSE) {
-            return None;
-        }
         let refined = tried.into_par_iter().take(BEST).filter_map(|(plane, _)| {
             let mut now = OFFSETS.map(|share| through(plane.normal, share, FINE)).into_iter().max_by(more)?;
             let mut step = STEPS.0;
@@ -245,7 +241,7 @@ impl<'a> Thing<'a> {
             Some(now)
         });
         let (plane, likeness) = refined.max_by(more)?;
-        is_enough(likeness, FINE).then_some(plane)
+        (likeness >= LEAST_LIKENESS * self.mean_likeness(|p| p, FINE)).then_some(plane)
     }
 
     /// Part that the labeled Gaussians around the mirror image of Gaussian `g` have, if they look like it.
