@@ -15,7 +15,7 @@ pub(crate) use views::ViewReport;
 use super::associate::{Link, conflicts, link};
 use super::error::FindError;
 use super::floaters::drop_floaters;
-use super::mirror::guess;
+use super::mirror::{GUESSED, guess};
 use super::propagate::extend;
 use super::removed::RemovedThings;
 use super::sam2_tracker::{LABEL_SIDE_PX, Sam2Tracker};
@@ -55,8 +55,6 @@ pub(crate) struct Tracked {
     pub(crate) conflicts: Vec<(usize, ConflictKind)>,
     /// The masks of the photos that were segmented and of those to which they were followed.
     pub(crate) masks: Vec<CodeView>,
-    /// Numbers of Gaussians that are guessed from mirror images.
-    pub(crate) guessed: Vec<(IdentityId, usize)>,
     /// Seconds that each stage took, in order.
     pub(crate) secs: Vec<(&'static str, f64)>,
 }
@@ -70,7 +68,10 @@ impl Tracked {
                 seen[s.identity as usize - 1].add(k, s.pixels as u64, s.confidence);
             }
         }
-        self.guessed.iter().for_each(|(id, n)| seen[*id as usize - 1].guessed = *n as u64);
+        for guess in self.assignments.iter().filter(|a| a.margin == GUESSED) {
+            let place = (guess.identity as usize).checked_sub(1);
+            place.and_then(|k| seen.get_mut(k)).into_iter().for_each(|seen| seen.guessed += 1);
+        }
         let place = |photo: usize| self.views.iter().position(|v| v.photo == photo);
         let conflict = |(photo, what): &(usize, ConflictKind)| {
             place(*photo).map(|k| MaskConflict { photo: k as u32, what: what.clone() })
@@ -163,8 +164,9 @@ pub(crate) fn track(
         t.votes.decide(&t.identities, LEAST_VOTES)
     };
     let views = t.look(&identities_of(&assignments), observer)?;
-    let guessed =
-        if options.by_mirror { guess(cloud, &t.identities, &said, &mut assignments, observer)? } else { Vec::new() };
+    if options.by_mirror {
+        guess(cloud, &t.identities, &said, &mut assignments, observer)?;
+    }
     extend(cloud, &mut assignments, options.hidden_steps);
     drop_floaters(cloud, &t.identities, &mut assignments);
     if let Some(map) = &options.known {
@@ -186,7 +188,7 @@ pub(crate) fn track(
         ("carry by Gaussians", carry_secs),
     ];
     let Tracker { identities, conflicts, masks, .. } = t;
-    Ok(Tracked { identities, assignments, seeds, views, inferred, conflicts, masks, guessed, secs })
+    Ok(Tracked { identities, assignments, seeds, views, inferred, conflicts, masks, secs })
 }
 
 /// Masks of a photo, and their identities.
