@@ -1,5 +1,6 @@
 //! Plain mathematics with no knowledge of scenes: everything here is pure and total.
 
+pub(crate) mod blur;
 pub(crate) mod cholesky;
 pub(crate) mod colormap;
 pub(crate) mod disjoint;

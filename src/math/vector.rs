@@ -1,5 +1,8 @@
 //! Vectors of any length.
 
+use super::Real;
+use super::lanes::{LANES, LaneOp, Lanes};
+
 /// The vector with unit length; `None` for one that is zero or not finite.
 pub fn unit(v: &[f32]) -> Option<Vec<f32>> {
     // In f64, so that neither tiny nor huge entries spoil the sum of squares.
@@ -9,14 +12,63 @@ pub fn unit(v: &[f32]) -> Option<Vec<f32>> {
 
 /// Scalar product; of two vectors of unit length, their cosine.
 pub fn dot(a: &[f32], b: &[f32]) -> f32 {
-    // Eight sums side by side, because one alone would wait for itself at every step.
-    let mut sums = [0.0_f32; 8];
-    let (a8, b8) = (a.chunks_exact(8), b.chunks_exact(8));
-    let rest: f32 = a8.remainder().iter().zip(b8.remainder()).map(|(a, b)| a * b).sum();
-    for (a, b) in a8.zip(b8) {
-        sums.iter_mut().zip(a.iter().zip(b)).for_each(|(sum, (a, b))| *sum += a * b);
+    f32::vectorize(Dot { a, b })
+}
+
+struct Dot<'a> {
+    a: &'a [f32],
+    b: &'a [f32],
+}
+
+impl LaneOp<f32> for Dot<'_> {
+    type Output = f32;
+
+    #[inline(always)]
+    fn run<L: Lanes<f32>>(self, l: L) -> f32 {
+        let (a, a_rest) = self.a.as_chunks::<LANES>();
+        let (b, b_rest) = self.b.as_chunks::<LANES>();
+        // Two sums side by side, because one alone would wait for itself at every step.
+        let (mut even, mut odd) = (l.splat(0.0), l.splat(0.0));
+        let (mut k, n) = (0, a.len().min(b.len()));
+        while k + 1 < n {
+            even = l.mul_add(l.load(&a[k]), l.load(&b[k]), even);
+            odd = l.mul_add(l.load(&a[k + 1]), l.load(&b[k + 1]), odd);
+            k += 2;
+        }
+        if k < n {
+            even = l.mul_add(l.load(&a[k]), l.load(&b[k]), even);
+        }
+        let rest: f32 = a_rest.iter().zip(b_rest).map(|(a, b)| a * b).sum();
+        l.sum(l.add(even, odd)) + rest
     }
-    sums.iter().sum::<f32>() + rest
+}
+
+/// Adds `by` times a vector to another one, as far as both reach.
+pub fn add_scaled(out: &mut [f32], from: &[f32], by: f32) {
+    f32::vectorize(AddScaled { out, from, by });
+}
+
+struct AddScaled<'a> {
+    out: &'a mut [f32],
+    from: &'a [f32],
+    by: f32,
+}
+
+impl LaneOp<f32> for AddScaled<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<L: Lanes<f32>>(self, l: L) {
+        let (out, out_rest) = self.out.as_chunks_mut::<LANES>();
+        let (from, from_rest) = self.from.as_chunks::<LANES>();
+        let by = l.splat(self.by);
+        let (mut k, n) = (0, out.len().min(from.len()));
+        while k < n {
+            out[k] = l.store(l.mul_add(by, l.load(&from[k]), l.load(&out[k])));
+            k += 1;
+        }
+        out_rest.iter_mut().zip(from_rest).for_each(|(out, from)| *out += self.by * from);
+    }
 }
 
 #[cfg(test)]

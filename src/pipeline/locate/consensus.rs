@@ -8,7 +8,9 @@ use rayon::prelude::*;
 
 use super::p3p;
 use super::pose::{PARAMETERS, flow, moved};
+use crate::math::Real;
 use crate::math::cholesky::solve;
+use crate::math::lanes::{LANES, Lane, LaneOp, Lanes};
 use crate::scene::Camera;
 
 /// Samples at most for each focal length.
@@ -48,12 +50,13 @@ pub(super) fn consensus(
     if matches.len() < FEWEST {
         return None;
     }
+    let lanes = MatchLanes::of(matches);
     let with = |focal: &f64| {
         let lens = Camera { focal_px: template.focal_px * *focal, ..template.clone() };
-        sampled(matches, &lens, within_px)
+        sampled(matches, &lanes, &lens, within_px)
     };
-    let sampled: Vec<Option<(f64, Camera)>> = focals.par_iter().map(with).collect();
-    let mut best: Option<(f64, Camera)> = None;
+    let sampled: Vec<Option<(f32, Camera)>> = focals.par_iter().map(with).collect();
+    let mut best: Option<(f32, Camera)> = None;
     for (cost, camera) in sampled.into_iter().flatten() {
         if best.as_ref().is_none_or(|(least, _)| cost < *least) {
             best = Some((cost, camera));
@@ -76,11 +79,91 @@ fn agreeing(matches: &[PointMatch], camera: &Camera, within_px: f64) -> Vec<usiz
     (0..matches.len()).filter(|&i| error(&matches[i], camera) <= within_px * within_px).collect()
 }
 
-/// The best pose of samples of three, and its cost: squared errors, each at most that of the bound.
-fn sampled(matches: &[PointMatch], lens: &Camera, within_px: f64) -> Option<(f64, Camera)> {
+/// Matches, eight at a time: places in the world, from that of the first one, and in the photo. After the last match
+/// come some that no pose agrees with.
+struct MatchLanes {
+    origin: DVec3,
+    of: Vec<[Lane<f32>; 5]>,
+}
+
+impl MatchLanes {
+    fn of(matches: &[PointMatch]) -> Self {
+        let origin = matches.first().map_or(DVec3::ZERO, |m| m.world);
+        let mut of = vec![[[f32::NAN; LANES]; 5]; matches.len().div_ceil(LANES)];
+        for (i, m) in matches.iter().enumerate() {
+            let [x, y, z] = (m.world - origin).to_array();
+            let values = [x, y, z, m.pixel.x, m.pixel.y].map(|v| v as f32);
+            of[i / LANES].iter_mut().zip(values).for_each(|(lane, v)| lane[i % LANES] = v);
+        }
+        Self { origin, of }
+    }
+
+    /// Squared errors of a pose, each at most `bound`, px²; any sum of at least `most`, if it is more.
+    fn cost(&self, camera: &Camera, bound: f64, most: f32) -> f32 {
+        let t = camera.camera_from_world(self.origin);
+        let rows = camera.world_from_camera.to_cols_array_2d();
+        let line = |k: usize| [rows[k][0], rows[k][1], rows[k][2], t[k]].map(|v| v as f32);
+        let [focal, principal] = [camera.focal_px, camera.principal_px].map(|v| v.to_array().map(|v| v as f32));
+        f32::vectorize(Cost {
+            of: &self.of,
+            pose: [line(0), line(1), line(2)],
+            focal,
+            principal,
+            bound: bound as f32,
+            most,
+        })
+    }
+}
+
+/// The sum of the squared errors of a pose.
+struct Cost<'a> {
+    of: &'a [[Lane<f32>; 5]],
+    /// Rows of camera_from_world, each with its translation.
+    pose: [[f32; 4]; 3],
+    focal: [f32; 2],
+    principal: [f32; 2],
+    bound: f32,
+    most: f32,
+}
+
+impl LaneOp<f32> for Cost<'_> {
+    type Output = f32;
+
+    #[inline(always)]
+    fn run<L: Lanes<f32>>(self, l: L) -> f32 {
+        let (zero, bound) = (l.splat(0.0), l.splat(self.bound));
+        let mut sum = zero;
+        let mut k = 0;
+        while k < self.of.len() {
+            let [x, y, z, u, v] = &self.of[k];
+            let (x, y, z) = (l.load(x), l.load(y), l.load(z));
+            let (row, mut seen) = (&self.pose, [zero; 3]);
+            let mut c = 0;
+            while c < 3 {
+                let plane = l.mul_add(l.splat(row[c][2]), z, l.splat(row[c][3]));
+                seen[c] = l.mul_add(l.splat(row[c][0]), x, l.mul_add(l.splat(row[c][1]), y, plane));
+                c += 1;
+            }
+            let right = l
+                .sub(l.mul_add(l.div(seen[0], seen[2]), l.splat(self.focal[0]), l.splat(self.principal[0])), l.load(u));
+            let down = l
+                .sub(l.mul_add(l.div(seen[1], seen[2]), l.splat(self.focal[1]), l.splat(self.principal[1])), l.load(v));
+            let off = l.mul_add(right, right, l.mul(down, down));
+            sum = l.add(sum, l.select(l.both(l.gt(seen[2], zero), l.gt(bound, off)), off, bound));
+            k += 1;
+            if k % 4 == 0 && l.sum(sum) >= self.most {
+                break;
+            }
+        }
+        l.sum(sum)
+    }
+}
+
+/// The best pose of samples of three, and its cost.
+fn sampled(matches: &[PointMatch], lanes: &MatchLanes, lens: &Camera, within_px: f64) -> Option<(f32, Camera)> {
     let mut rng = Pcg64Mcg::seed_from_u64(matches.len() as u64);
     let (n, bound) = (matches.len(), within_px * within_px);
-    let mut best: Option<(f64, Camera)> = None;
+    let mut best: Option<(f32, Camera)> = None;
     let mut enough = SAMPLES;
     let mut drawn = 0;
     while drawn < enough {
@@ -95,14 +178,8 @@ fn sampled(matches: &[PointMatch], lens: &Camera, within_px: f64) -> Option<(f64
         let found = p3p::poses([ray(0), ray(1), ray(2)], [of(0).world, of(1).world, of(2).world]);
         for (world_from_camera, center) in found {
             let camera = Camera { world_from_camera, center, ..lens.clone() };
-            let least = best.as_ref().map_or(f64::INFINITY, |(least, _)| *least);
-            let mut cost = 0.0;
-            for m in matches {
-                cost += error(m, &camera).min(bound);
-                if cost >= least {
-                    break;
-                }
-            }
+            let least = best.as_ref().map_or(f32::INFINITY, |(least, _)| *least);
+            let cost = lanes.cost(&camera, bound, least);
             if cost < least {
                 let share = agreeing(matches, &camera, within_px).len() as f64 / n as f64;
                 let misses = (1.0 - share.powi(3)).clamp(1e-12, 1.0 - 1e-12);
@@ -184,6 +261,26 @@ mod tests {
         let found = consensus(&matches, &elsewhere, &[1.0], 3.0).expect("a pose");
         assert!(found.camera.center.distance(truth.center) < 0.02, "{}", found.camera.center);
         assert!(found.inliers.len() >= 95 && found.inliers.len() < 110, "{}", found.inliers.len());
+    }
+
+    #[test]
+    fn the_cost_of_a_pose_is_that_of_its_errors() {
+        let (truth, bound) = (camera(), 9.0);
+        let mut matches = made_up(&truth, 61, 20, 1.0);
+        // One match is behind the camera.
+        matches[40].world = truth.center - truth.forward();
+        let lanes = MatchLanes::of(&matches);
+        for turn in [0.0, 0.01, 1.0] {
+            let camera = Camera {
+                world_from_camera: glam::DMat3::from_rotation_z(turn) * truth.world_from_camera,
+                ..truth.clone()
+            };
+            let padding = matches.len().next_multiple_of(LANES) - matches.len();
+            let want = matches.iter().map(|m| error(m, &camera).min(bound)).sum::<f64>() + padding as f64 * bound;
+            let found = f64::from(lanes.cost(&camera, bound, f32::INFINITY));
+            assert!((found - want).abs() < 1e-3 * want, "{found} {want}");
+            assert!(f64::from(lanes.cost(&camera, bound, 0.3 * want as f32)) >= 0.3 * want, "it may stop there");
+        }
     }
 
     #[test]

@@ -34,12 +34,21 @@ pub(super) fn pairs(
     view: &[WorldFeature],
     allowed: impl Fn(DVec2, DVec2) -> bool + Sync,
 ) -> Vec<(usize, usize)> {
+    if view.is_empty() {
+        return Vec::new();
+    }
+    // Of each feature of the photo, the squared distances to all of the view.
+    let mut table = vec![0.0_f32; photo.len() * view.len()];
+    table.par_chunks_mut(view.len()).zip(photo).for_each(|(out, own)| {
+        out.iter_mut().zip(view).for_each(|(d, other)| *d = distance(&own.descriptor, &other.descriptor));
+    });
+    let distance = |i: usize, j: usize| table[i * view.len() + j];
     let nearest = |i: usize| -> Option<(usize, usize)> {
         let own = &photo[i];
         let mut best = (f32::INFINITY, usize::MAX);
         let mut rival = f32::INFINITY;
         for (j, other) in view.iter().enumerate().filter(|(_, other)| allowed(own.at, other.at)) {
-            let d = distance(&own.descriptor, &other.descriptor);
+            let d = distance(i, j);
             let apart = |k: usize| view.get(k).is_none_or(|b| b.at.distance(other.at) > SAME_PX);
             if d < best.0 {
                 if apart(best.1) {
@@ -54,14 +63,11 @@ pub(super) fn pairs(
     };
     let found: Vec<(usize, usize)> = (0..photo.len()).into_par_iter().filter_map(nearest).collect();
     let mutual = |&(i, j): &(usize, usize)| {
-        let other = &view[j];
-        let own = distance(&photo[i].descriptor, &other.descriptor);
-        let nearer = |p: &PictureFeature| {
-            p.at.distance(photo[i].at) > SAME_PX
-                && allowed(p.at, other.at)
-                && distance(&p.descriptor, &other.descriptor) < own
+        let nearer = |k: usize| {
+            let p = &photo[k];
+            distance(k, j) < distance(i, j) && p.at.distance(photo[i].at) > SAME_PX && allowed(p.at, view[j].at)
         };
-        !photo.iter().any(nearer)
+        !(0..photo.len()).any(nearer)
     };
     found.into_par_iter().filter(mutual).collect()
 }

@@ -3,6 +3,8 @@
 
 use rayon::prelude::*;
 
+use crate::math::blur::blur;
+
 /// Width of the blur at each scale, px, and its share of the strength.
 const SCALES: [(f32, f32); 3] = [(0.8, 0.3), (1.6, 0.35), (3.2, 0.35)];
 
@@ -40,36 +42,6 @@ fn gradient_squared(plane: &[f32], width: usize) -> Vec<f32> {
             out[y * width + x] = 0.25 * (dx * dx + dy * dy);
         }
     }
-    out
-}
-
-/// Blurs a plane by a Gaussian; the border pixels repeat.
-pub(crate) fn blur(plane: &[f32], width: usize, sigma: f32) -> Vec<f32> {
-    let reach = (3.0 * sigma).ceil() as isize;
-    let mut weights: Vec<f32> = (-reach..=reach).map(|d| (-0.5 * (d as f32 / sigma).powi(2)).exp()).collect();
-    let sum: f32 = weights.iter().sum();
-    weights.iter_mut().for_each(|w| *w /= sum);
-    let height = plane.len() / width.max(1);
-    let mut rows = vec![0.0; plane.len()];
-    rows.par_chunks_mut(width.max(1)).zip(plane.par_chunks(width.max(1))).for_each(|(out, row)| {
-        for (x, out) in out.iter_mut().enumerate() {
-            let inside = x as isize >= reach && x as isize + reach < width as isize;
-            *out = if inside {
-                let from = x - reach as usize;
-                weights.iter().zip(&row[from..]).map(|(w, v)| w * v).sum()
-            } else {
-                let at = |d: isize| row[(x as isize + d).clamp(0, width as isize - 1) as usize];
-                weights.iter().zip(-reach..).map(|(w, d)| w * at(d)).sum()
-            };
-        }
-    });
-    let mut out = vec![0.0; plane.len()];
-    out.par_chunks_mut(width.max(1)).enumerate().for_each(|(y, out)| {
-        for (w, d) in weights.iter().zip(-reach..) {
-            let from = (y as isize + d).clamp(0, height as isize - 1) as usize * width;
-            out.iter_mut().zip(&rows[from..from + width]).for_each(|(o, v)| *o += w * v);
-        }
-    });
     out
 }
 

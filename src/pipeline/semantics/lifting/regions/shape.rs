@@ -6,7 +6,7 @@
 
 use rayon::prelude::*;
 
-use super::edges::blur;
+use crate::math::blur::blur;
 use crate::render::{Features, RenderSettings, Renderer};
 use crate::scene::{Camera, GaussianCloud};
 
