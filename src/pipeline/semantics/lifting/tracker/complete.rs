@@ -7,13 +7,14 @@
 
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
+use std::time::Instant;
 
 use super::super::error::FindError;
 use super::super::regions::edges::{ImagePlanes, strength};
 use super::super::regions::lab::{lab, planes};
 use super::super::regions::shape::ends_of;
 use super::super::votes::UNKNOWN;
-use super::{Tracker, ViewReport, gone};
+use super::{CarryStage, Tracker, ViewReport, gone};
 use crate::io;
 use crate::math::grid::neighbors;
 use crate::pipeline::observer::{Observer, Severity, Ticker};
@@ -31,7 +32,7 @@ const SIDE_PX: u32 = 320;
 impl Tracker<'_> {
     /// Completes the labels in the photos, those with most known pixels first; each completed photo helps the next.
     pub(super) fn complete(&mut self, views: &[ViewReport], observer: &mut dyn Observer) -> Result<(), FindError> {
-        let options = GrowOptions::default();
+        let (options, start) = (GrowOptions::default(), Instant::now());
         let mut order: Vec<&ViewReport> = views.iter().filter(|v| v.unknown > 0.0).collect();
         order.sort_by(|a, b| a.unknown.total_cmp(&b.unknown).then(a.photo.cmp(&b.photo)));
         let mut ticker = Ticker::new("Completing identities in the photos", 2 * order.len());
@@ -58,6 +59,8 @@ impl Tracker<'_> {
             ticker.tick(i + 1, observer)?;
         }
         let colors = counts.compare(options.unseen);
+        self.secs.add(CarryStage::Read, start);
+        let start = Instant::now();
         for (i, (photo, grid)) in terrains.iter().enumerate() {
             let map = self.map(*photo, SIDE_PX)?;
             let known = sure(&map, options.share);
@@ -72,6 +75,7 @@ impl Tracker<'_> {
                 .map_err(|e| FindError::Render(photo.name.clone(), e.into()))?;
             ticker.tick(order.len() + i + 1, observer)?;
         }
+        self.secs.add(CarryStage::Grow, start);
         Ok(())
     }
 }

@@ -1,8 +1,10 @@
 //! Identities seen in each photo, and its share of unknown pixels.
 
+use std::time::Instant;
+
 use super::super::error::FindError;
 use super::super::segmenter::Segmenter;
-use super::Tracker;
+use super::{CarryStage, Tracker};
 use crate::pipeline::observer::{Observer, Ticker};
 use crate::pipeline::semantics::view_map::ViewMap;
 use crate::scene::IdentityId;
@@ -32,13 +34,14 @@ impl Tracker<'_> {
         of: &[IdentityId],
         observer: &mut dyn Observer,
     ) -> Result<Vec<ViewReport>, FindError> {
-        let mut ticker = Ticker::new("Checking labels", self.photos.len());
+        let (start, mut ticker) = (Instant::now(), Ticker::new("Checking labels", self.photos.len()));
         observer.proceed()?;
         let mut views = Vec::with_capacity(self.photos.len());
         for photo in 0..self.photos.len() {
             views.push(self.look_at(photo, of)?);
             ticker.tick(photo + 1, observer)?;
         }
+        self.secs.add(CarryStage::Look, start);
         Ok(views)
     }
 
