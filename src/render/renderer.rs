@@ -209,8 +209,7 @@ impl Renderer {
         if let Some(gpu) = self.gpu.as_mut().filter(|gpu| std::ptr::eq(gpu.uploaded.as_ptr(), cloud)) {
             return Ok(gpu.renderer.label_winners((of, groups), camera, settings)?);
         }
-        let weights = self.label_weights(cloud, of, camera, settings)?;
-        Ok(weights.iter().map(|places| labels::winner(places, groups)).collect())
+        Ok(labels::label_winners(&mut self.cpu, cloud, (of, groups), camera, settings)?)
     }
 
     /// The labels of largest weight at each pixel, row-major, on the CPU; `of` has a label for each Gaussian of
