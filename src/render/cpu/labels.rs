@@ -3,11 +3,10 @@
 
 use std::ops::Range;
 
-use super::CpuRenderer;
+use super::view_weights::ViewWeights;
 use super::walk::SLOTS;
 use crate::math::lanes::{LANES, Lane, Lanes, Plain};
-use crate::render::{ContributionSink, RenderError, RenderSettings, TILE_PX};
-use crate::scene::{Camera, GaussianCloud};
+use crate::render::{ContributionSink, RenderError, TILE_PX};
 
 /// Labels that compete for one pixel at most; the least is dropped.
 pub(crate) const COMPETITORS: usize = 8;
@@ -28,46 +27,29 @@ pub struct LabelWinner {
 /// Labels of a pixel with their accumulated weights. Unused places have weight 0.
 pub type PixelWeights = [(u32, f32); COMPETITORS];
 
-/// The weights of a view's pixels, row-major, by the label `of` each Gaussian of `cloud`.
-pub(crate) fn label_weights(
-    renderer: &mut CpuRenderer<f32>,
-    cloud: &GaussianCloud,
-    of: &[u32],
-    camera: &Camera,
-    settings: &RenderSettings,
-) -> Result<Vec<PixelWeights>, RenderError> {
-    of_pixels([camera.width_px, camera.height_px], of, &|places| *places, |rows| {
-        renderer.contributions(cloud, camera, settings, rows)
-    })
+/// The labels of largest weight at each pixel, row-major; `of` has a label for each Gaussian.
+pub(crate) fn label_weights(view: &mut ViewWeights<'_>, of: &[u32]) -> Result<Vec<PixelWeights>, RenderError> {
+    of_pixels(view, of, &|places| *places)
 }
 
-/// The label that wins each pixel of a view, row-major: `of` has one for each Gaussian of `cloud`, `groups` the group of
-/// each label.
+/// The label that wins each pixel, row-major: `of` has one for each Gaussian, `groups` the group of each label.
 pub(crate) fn label_winners(
-    renderer: &mut CpuRenderer<f32>,
-    cloud: &GaussianCloud,
+    view: &mut ViewWeights<'_>,
     (of, groups): (&[u32], &[u32]),
-    camera: &Camera,
-    settings: &RenderSettings,
 ) -> Result<Vec<LabelWinner>, RenderError> {
-    of_pixels([camera.width_px, camera.height_px], of, &|places| winner(places, groups), |rows| {
-        renderer.contributions(cloud, camera, settings, rows)
-    })
+    of_pixels(view, of, &|places| winner(places, groups))
 }
 
-/// Makes something of the competitors of each pixel, row-major. `draw` hands the weights to the rows of tiles.
+/// Makes something of the competitors of each pixel, row-major.
 fn of_pixels<T: Copy + Send, F: Fn(&PixelWeights) -> T + Sync>(
-    size: [u32; 2],
+    view: &mut ViewWeights<'_>,
     of: &[u32],
     make: &F,
-    draw: impl FnOnce(&mut [LabelRow<'_, T, F>]) -> Result<(), RenderError>,
 ) -> Result<Vec<T>, RenderError> {
-    let [width, height] = size.map(|side| side as usize);
-    let mut rows: Vec<LabelRow<'_, T, F>> = (0..height)
-        .step_by(TILE_PX)
-        .map(|top| LabelRow::new(of, make, width, top..height.min(top + TILE_PX)))
-        .collect();
-    draw(&mut rows)?;
+    let [width, height] = view.size_px();
+    let row = |top: usize| LabelRow::new(of, make, width, top..height.min(top + TILE_PX));
+    let mut rows: Vec<LabelRow<'_, T, F>> = (0..height).step_by(TILE_PX).map(row).collect();
+    view.give(&mut rows)?;
     let mut pixels = Vec::with_capacity(width * height);
     for mut row in rows {
         row.finish_tile();
@@ -236,6 +218,9 @@ mod tests {
     use glam::DVec3;
 
     use super::*;
+    use crate::render::RenderSettings;
+    use crate::render::cpu::CpuRenderer;
+    use crate::scene::{Camera, GaussianCloud};
 
     /// A pixel with these places taken.
     fn pixel(taken: &[(u32, f32)]) -> PixelWeights {
@@ -324,12 +309,15 @@ mod tests {
             let expected = reference(&cloud, &of, &from(0.0));
             let most = expected.iter().map(|p| p.iter().filter(|p| p.1 > 0.0).count()).max();
             assert_eq!(most, Some(COMPETITORS.min(labels as usize)));
-            let found = label_weights(&mut renderer, &cloud, &of, &from(0.0), &settings).expect("drawn");
+            let (camera, apart) = (from(0.0), from(0.3));
+            let mut view = ViewWeights::new(&mut renderer, &cloud, &camera, &settings, false);
+            let found = label_weights(&mut view, &of).expect("drawn");
             assert!(found == expected, "{labels} labels, bit by bit");
             let groups: Vec<u32> = (0..labels).map(|label| label % 5).collect();
-            let winners = label_winners(&mut renderer, &cloud, (&of, &groups), &from(0.0), &settings).expect("drawn");
+            let winners = label_winners(&mut view, (&of, &groups)).expect("drawn again");
             assert_eq!(winners, expected.iter().map(|p| winner(p, &groups)).collect::<Vec<_>>());
-            let other = label_weights(&mut renderer, &cloud, &of, &from(0.3), &settings).expect("drawn");
+            let mut view = ViewWeights::new(&mut renderer, &cloud, &apart, &settings, false);
+            let other = label_weights(&mut view, &of).expect("drawn");
             assert!(other != expected, "the control, of another camera");
         }
     }

@@ -25,6 +25,7 @@ pub(crate) mod splat;
 pub mod ssim;
 pub(crate) mod surfel;
 pub(crate) mod validate;
+pub(crate) mod view_weights;
 pub(crate) mod walk;
 
 use std::sync::Arc;
@@ -156,6 +157,22 @@ impl<R: Real> CpuRenderer<R> {
         self.surfels = None;
         let settings = RenderSettings { sh_degree: 0, depth: false, keep_order: false, ..settings.clone() };
         Ok(self.splats.contributions(cloud, camera, &settings, sinks)?)
+    }
+
+    /// [`Self::contributions`] without projecting, binning and sorting, if the last frame was of this cloud and camera,
+    /// seen alike ([`RenderSettings::sees_like`]).
+    pub(crate) fn contributions_again<S: ContributionSink<R>>(
+        &mut self,
+        cloud: &GaussianCloud<R>,
+        camera: &Camera,
+        settings: &RenderSettings,
+        sinks: &mut [S],
+    ) -> Result<(), RenderError> {
+        // Surfels do not have the weights of Gaussians.
+        match self.surfels.is_none() && self.splats.contributions_again(sinks) {
+            true => Ok(()),
+            false => self.contributions(cloud, camera, settings, sinks),
+        }
     }
 
     /// Backward pass over the tiles of the last frame. Afterwards [`Self::gaussian_gradient`]

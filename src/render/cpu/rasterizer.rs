@@ -36,6 +36,8 @@ pub(crate) struct CpuRasterizer<R, P> {
     /// Sums of the backward pass, for each tile entry.
     pub(crate) records: Vec<R>,
     frame: Option<FrameInfo<R, P>>,
+    /// State of the last frame of which only the weights were wanted.
+    weighed: Option<FrameInfo<R, P>>,
     /// Cut that is drawn instead of clouds that it fits.
     pub(crate) cut: Option<Arc<Cut<R>>>,
     /// True if nothing is kept for a backward pass, which then does nothing.
@@ -95,6 +97,7 @@ impl<R: Real, P> Default for CpuRasterizer<R, P> {
             splat_of: Vec::new(),
             records: Vec::new(),
             frame: None,
+            weighed: None,
             cut: None,
             forward_only: false,
             stats: RenderStats::default(),
@@ -142,7 +145,7 @@ impl<R: Real, P: Primitive<R>> CpuRasterizer<R, P> {
         camera: &Camera,
         settings: &RenderSettings,
     ) -> Result<(FrameInfo<R, P>, [f64; 3]), NotFinite> {
-        self.frame = None;
+        (self.frame, self.weighed) = (None, None);
         let cut = self.cut.as_deref().filter(|cut| cut.fits(cloud));
         let extra = features.channels;
         let channels = P::padded(P::channels(extra, settings.depth));
@@ -229,11 +232,19 @@ impl<R: Real, P: Primitive<R>> CpuRasterizer<R, P> {
         sinks: &mut [S],
     ) -> Result<(), NotFinite> {
         let (info, _) = self.prepare(cloud, Features::NONE, camera, settings)?;
+        self.weighed = Some(info);
+        self.contributions_again(sinks);
+        Ok(())
+    }
+
+    /// The same of the frame drawn or weighed last; returns whether there is one.
+    pub(crate) fn contributions_again<S: ContributionSink<R>>(&self, sinks: &mut [S]) -> bool {
+        let Some(info) = self.frame.as_ref().or(self.weighed.as_ref()) else { return false };
         let lists = &self.lists;
         sinks.par_iter_mut().take(lists.tiles.grid[1]).enumerate().for_each(|(ty, sink)| {
-            P::run(info.channels, ContributionRow { row: lists.row(&info, ty), sink });
+            P::run(info.channels, ContributionRow { row: lists.row(info, ty), sink });
         });
-        Ok(())
+        true
     }
 
     /// Backward pass over the tiles of the last frame; does nothing before the first, nor where none was kept.

@@ -37,6 +37,7 @@ mod prompt_points;
 pub(crate) mod propagate;
 pub mod regions;
 pub(crate) mod removed;
+mod renderers;
 pub(crate) mod sam2_tracker;
 pub mod segmenter;
 pub(crate) mod splat_tree;

@@ -3,7 +3,7 @@
 use glam::DVec3;
 
 use crate::math::lanes::{LANES, Lane};
-use crate::render::{self, ContributionSink, RenderError, RenderSettings, Renderer, TILE_PX};
+use crate::render::{self, ContributionSink, RenderError, TILE_PX, ViewWeights};
 use crate::scene::{Camera, GaussianCloud, IdentityId};
 
 /// Weights of the Gaussians in a view.
@@ -16,34 +16,23 @@ pub(crate) struct ViewVotes {
 }
 
 impl ViewVotes {
-    /// Draws a view. `labels` holds a label for each pixel, row-major.
-    pub(crate) fn drawn(
-        renderer: &mut Renderer,
-        cloud: &GaussianCloud,
-        camera: &Camera,
-        settings: &RenderSettings,
-        labels: &[IdentityId],
-    ) -> Result<Self, RenderError> {
-        let (width, height) = (camera.width_px as usize, camera.height_px as usize);
+    /// Sums the weights in a view. `labels` holds a label for each pixel, row-major.
+    pub(crate) fn of(view: &mut ViewWeights<'_>, labels: &[IdentityId]) -> Result<Self, RenderError> {
+        let [width, height] = view.size_px();
         assert_eq!(labels.len(), width * height, "one label per pixel");
         let common = common(labels, width);
         let mut rows: Vec<VoteRow<'_>> =
             (0..height.div_ceil(TILE_PX)).map(|_| VoteRow::new(labels, &common, width)).collect();
-        renderer.contributions(cloud, camera, settings, &mut rows)?;
+        view.give(&mut rows)?;
         rows.iter_mut().for_each(VoteRow::finish);
         let rows: Vec<_> = rows.into_iter().map(|r| r.found).collect();
-        Ok(Self { areas: areas(cloud, camera, &rows), rows })
+        Ok(Self { areas: areas(view.cloud, view.camera, &rows), rows })
     }
 
-    /// Draws a view in which no label is known.
-    pub(crate) fn without_labels(
-        renderer: &mut Renderer,
-        cloud: &GaussianCloud,
-        camera: &Camera,
-        settings: &RenderSettings,
-    ) -> Result<Self, RenderError> {
-        let labels = vec![render::UNKNOWN; camera.width_px as usize * camera.height_px as usize];
-        Self::drawn(renderer, cloud, camera, settings, &labels)
+    /// Returns the area of each Gaussian in a view, square units.
+    pub(crate) fn areas_of(view: &mut ViewWeights<'_>) -> Result<Vec<f32>, RenderError> {
+        let [width, height] = view.size_px();
+        Ok(Self::of(view, &vec![render::UNKNOWN; width * height])?.areas)
     }
 
     /// All weights: Gaussian, label of pixels, and its weight in them, px.
@@ -128,6 +117,7 @@ impl ContributionSink<f32> for VoteRow<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::render::{RenderSettings, Renderer};
 
     const UNKNOWN: IdentityId = render::UNKNOWN;
 
@@ -179,7 +169,7 @@ mod tests {
         renderer.contributions(&cloud, &from(0.0), &settings, &mut rows).expect("drawn");
         let expected: Vec<_> = rows.into_iter().flat_map(|r| r.found).collect();
         let found = |renderer: &mut Renderer, x: f64| {
-            ViewVotes::drawn(renderer, &cloud, &from(x), &settings, &labels).expect("drawn")
+            ViewVotes::of(&mut renderer.weights(&cloud, &from(x), &settings), &labels).expect("drawn")
         };
         let view = found(&mut renderer, 0.0);
         assert!(expected.len() > 600, "{}", expected.len());

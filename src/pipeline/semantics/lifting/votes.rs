@@ -88,7 +88,7 @@ impl Votes {
         camera: &Camera,
         settings: &RenderSettings,
     ) -> Result<(), RenderError> {
-        self.note(&ViewVotes::without_labels(renderer, cloud, camera, settings)?.areas);
+        self.note(&ViewVotes::areas_of(&mut renderer.weights(cloud, camera, settings))?);
         Ok(())
     }
 
@@ -101,7 +101,7 @@ impl Votes {
         settings: &RenderSettings,
         labels: &[IdentityId],
     ) -> Result<(), RenderError> {
-        self.add(&ViewVotes::drawn(renderer, cloud, camera, settings, labels)?)
+        self.add(&ViewVotes::of(&mut renderer.weights(cloud, camera, settings), labels)?)
     }
 
     /// Adds the votes of one view.

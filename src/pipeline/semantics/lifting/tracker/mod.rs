@@ -4,6 +4,7 @@
 
 mod complete;
 mod gone;
+mod growth;
 mod options;
 mod tracked;
 mod views;
@@ -21,15 +22,17 @@ use super::floaters::drop_floaters;
 use super::mirror::guess;
 use super::propagate::extend;
 use super::removed::RemovedThings;
+use super::renderers::Renderers;
 use super::sam2_tracker::{LABEL_SIDE_PX, Sam2Tracker};
 use super::segmenter::{FoundMask, Segmenter};
 use super::splat_tree::hierarchy::Hierarchy;
 use super::train_codes::{CODE_SIDE_PX, CodeView};
+use super::view_votes::ViewVotes;
 use super::votes::{Assignment, LEAST_VOTES, UNKNOWN, Votes};
 use crate::math::format::things;
 use crate::pipeline::observer::{Observer, Severity, Ticker, begin};
 use crate::pipeline::semantics::view_map::ViewMap;
-use crate::render::{RenderSettings, Renderer};
+use crate::render::{DrawError, RenderSettings, Renderer};
 use crate::scene::findings::ConflictKind;
 use crate::scene::{GaussianCloud, Identities, IdentityId, NO_IDENTITY, Photo};
 
@@ -66,7 +69,7 @@ pub(crate) fn track(
         photos,
         settings,
         options,
-        renderer: Renderer::new(),
+        renderers: Renderers::new(cloud.len()),
         removed: options.removed.as_deref().map(|gone| RemovedThings::new(cloud, gone)),
         identities: options.known.as_ref().map_or_else(Identities::default, |map| map.identities.clone()),
         votes: match &options.known {
@@ -154,7 +157,7 @@ struct Tracker<'a> {
     photos: &'a [Photo],
     settings: &'a RenderSettings,
     options: &'a TrackOptions,
-    renderer: Renderer,
+    renderers: Renderers,
     removed: Option<RemovedThings>,
     identities: Identities,
     votes: Votes,
@@ -173,13 +176,16 @@ impl Tracker<'_> {
     /// Measures the visibility of each Gaussian in every photo, before any votes.
     fn see(&mut self, observer: &mut dyn Observer) -> Result<(), FindError> {
         let (start, mut ticker) = (Instant::now(), Ticker::new("Analyzing photos", self.photos.len()));
-        for (i, photo) in self.photos.iter().enumerate() {
+        let (cloud, settings, votes, mut done) = (self.cloud, self.settings, &mut self.votes, 0);
+        let areas = |renderer: &mut Renderer, photo: &Photo| {
             let camera = photo.camera.limited_to(SEE_SIDE_PX);
-            self.votes
-                .see(&mut self.renderer, self.cloud, &camera, self.settings)
-                .map_err(|e| FindError::Render(photo.name.clone(), e.into()))?;
-            ticker.tick(i + 1, observer)?;
-        }
+            ViewVotes::areas_of(&mut renderer.weights(cloud, &camera, settings)).map_err(|e| undrawn(photo, e))
+        };
+        self.renderers.each(self.photos, areas, |_, areas| {
+            votes.note(&areas);
+            done += 1;
+            Ok(ticker.tick(done, observer)?)
+        })?;
         self.secs.add(CarryStage::See, start);
         Ok(())
     }
@@ -236,8 +242,8 @@ impl Tracker<'_> {
         }
         gone::forget(&mut labels, gone.as_ref());
         self.votes
-            .add_view(&mut self.renderer, self.cloud, &camera, self.settings, &labels)
-            .map_err(|e| FindError::Render(self.photos[photo].name.clone(), e.into()))?;
+            .add_view(self.renderers.one(), self.cloud, &camera, self.settings, &labels)
+            .map_err(|e| undrawn(&self.photos[photo], e))?;
         self.keep(photo, (camera.width_px, camera.height_px), &labels);
         Ok(Some((found, ids)))
     }
@@ -282,11 +288,12 @@ impl Tracker<'_> {
                     self.conflicts.push((photo, ConflictKind::Drift(id)));
                 }
             }
-            gone::forget(&mut labels, gone::pixels(self, photo, LABEL_SIDE_PX)?.as_ref());
             let camera = self.photos[photo].camera.limited_to(LABEL_SIDE_PX);
+            let shown = gone::pixels(self.renderers.one(), self.removed.as_ref(), &camera, self.settings);
+            gone::forget(&mut labels, shown.map_err(|e| undrawn(&self.photos[photo], e))?.as_ref());
             self.votes
-                .add_view(&mut self.renderer, self.cloud, &camera, self.settings, &labels)
-                .map_err(|e| FindError::Render(self.photos[photo].name.clone(), e.into()))?;
+                .add_view(self.renderers.one(), self.cloud, &camera, self.settings, &labels)
+                .map_err(|e| undrawn(&self.photos[photo], e))?;
             self.keep(photo, (camera.width_px, camera.height_px), &labels);
         }
         Ok(())
@@ -315,9 +322,14 @@ impl Tracker<'_> {
     fn map_of(&mut self, photo: usize, max_side_px: u32, of: &[IdentityId]) -> Result<ViewMap, FindError> {
         let photo = &self.photos[photo];
         let camera = photo.camera.limited_to(max_side_px);
-        ViewMap::render(&mut self.renderer, self.cloud, of, &self.identities, &camera, self.settings)
-            .map_err(|e| FindError::Render(photo.name.clone(), e))
+        ViewMap::of(&mut self.renderers.one().weights(self.cloud, &camera, self.settings), of, &self.identities)
+            .map_err(|e| undrawn(photo, e))
     }
+}
+
+/// Error of a photo's view that could not be drawn.
+fn undrawn(photo: &Photo, e: impl Into<DrawError>) -> FindError {
+    FindError::Render(photo.name.clone(), e.into())
 }
 
 fn identities_of(assignments: &[Assignment]) -> Vec<IdentityId> {

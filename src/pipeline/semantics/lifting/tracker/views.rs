@@ -4,9 +4,10 @@ use std::time::Instant;
 
 use super::super::error::FindError;
 use super::super::segmenter::Segmenter;
-use super::{CarryStage, Tracker};
+use super::{CarryStage, SEE_SIDE_PX, Tracker, undrawn};
 use crate::pipeline::observer::{Observer, Ticker};
 use crate::pipeline::semantics::view_map::ViewMap;
+use crate::render::Renderer;
 use crate::scene::IdentityId;
 
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
@@ -37,10 +38,18 @@ impl Tracker<'_> {
         let (start, mut ticker) = (Instant::now(), Ticker::new("Checking labels", self.photos.len()));
         observer.proceed()?;
         let mut views = Vec::with_capacity(self.photos.len());
-        for photo in 0..self.photos.len() {
-            views.push(self.look_at(photo, of)?);
-            ticker.tick(photo + 1, observer)?;
-        }
+        let photos: Vec<usize> = (0..self.photos.len()).collect();
+        let (all, cloud, settings, identities) = (self.photos, self.cloud, self.settings, &self.identities);
+        let side_px = self.look_side_px();
+        let look = |renderer: &mut Renderer, photo: &usize| {
+            let camera = all[*photo].camera.limited_to(side_px);
+            let map = ViewMap::of(&mut renderer.weights(cloud, &camera, settings), of, identities);
+            Ok(report(*photo, &map.map_err(|e| undrawn(&all[*photo], e))?, identities.len()))
+        };
+        self.renderers.each(&photos, look, |photo, view| {
+            views.push(view);
+            Ok(ticker.tick(photo + 1, observer)?)
+        })?;
         self.secs.add(CarryStage::Look, start);
         Ok(views)
     }
@@ -71,9 +80,13 @@ impl Tracker<'_> {
     }
 
     fn look_at(&mut self, photo: usize, of: &[IdentityId]) -> Result<ViewReport, FindError> {
-        // A small picture suffices to measure the unknown share.
-        let map = self.map_of(photo, self.options.max_side_px.min(256), of)?;
+        let map = self.map_of(photo, self.look_side_px(), of)?;
         Ok(report(photo, &map, self.identities.len()))
+    }
+
+    /// Longer side of the views that are reported, px: a small picture suffices to measure the unknown share.
+    fn look_side_px(&self) -> u32 {
+        self.options.max_side_px.min(SEE_SIDE_PX)
     }
 
     /// Returns the photo with most unknown pixels among the open views. Masks make pixels known, hardly ever unknown.
