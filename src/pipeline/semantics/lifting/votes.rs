@@ -127,8 +127,12 @@ impl Votes {
         let by = |gains: &[f32]| -> Vec<Assignment> {
             self.by_gaussian.par_iter().map(|votes| decide(votes, &objects, gains, least)).collect()
         };
-        let plain = by(&vec![1.0; objects.len()]);
-        by(&self.gains(&plain, &objects))
+        let mut decided = by(&vec![1.0; objects.len()]);
+        let gains = self.gains(&decided, &objects);
+        // Where there is no choice, gains change nothing.
+        let contested = decided.par_iter_mut().zip(&self.by_gaussian).filter(|(_, votes)| votes.len() > 1);
+        contested.for_each(|(now, votes)| *now = decide(votes, &objects, &gains, least));
+        decided
     }
 
     /// Factors for the votes of each identity against others of its object, from the `plain` decisions.
@@ -174,15 +178,23 @@ fn decide(votes: &[(IdentityId, f32)], objects: &[IdentityId], gains: &[f32], le
     if !(total > 0.0 && total >= least) {
         return Assignment { identity: UNKNOWN, margin: 0.0 };
     }
+    if let [(identity, _)] = *votes {
+        return Assignment { identity, margin: 1.0 };
+    }
     let object_of = |id: IdentityId| objects.get(id as usize).copied().unwrap_or(NO_IDENTITY);
-    let mut sums: Vec<(IdentityId, f32)> = Vec::with_capacity(votes.len());
+    // Objects are at most as many as the identities that are kept.
+    let (mut sums, mut count) = ([(NO_IDENTITY, 0.0_f32); KEPT], 0);
     for &(id, weight) in votes {
         let object = object_of(id);
-        match sums.iter_mut().find(|s| s.0 == object) {
+        match sums[..count].iter_mut().find(|s| s.0 == object) {
             Some(s) => s.1 += weight,
-            None => sums.push((object, weight)),
+            None => {
+                sums[count] = (object, weight);
+                count += 1;
+            }
         }
     }
+    let sums = &mut sums[..count];
     sums.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
     let object = sums[0].0;
     let gained = |v: &(IdentityId, f32)| v.1 * gains.get(v.0 as usize).unwrap_or(&1.0);
