@@ -18,6 +18,7 @@ mod renderer;
 
 pub(crate) use cpu::adam::{AdamStep, Rates};
 pub(crate) use cpu::contributions::ContributionSink;
+pub(crate) use cpu::kept_view::KeptView;
 pub use cpu::labels::LabelWinner;
 pub(crate) use cpu::labels::{PixelWeights, UNKNOWN, label_winners};
 pub use cpu::pose_gradient::PoseGradient;

@@ -243,7 +243,7 @@ impl Renderer {
         camera: &'a Camera,
         settings: &'a RenderSettings,
     ) -> ViewWeights<'a> {
-        ViewWeights::new(&mut self.cpu, cloud, camera, settings, false)
+        ViewWeights::drawn(&mut self.cpu, cloud, camera, settings, false)
     }
 
     /// The same of the view that [`Self::render`] has just drawn, seen alike: the first pass, too, projects nothing.
@@ -253,7 +253,7 @@ impl Renderer {
         camera: &'a Camera,
         settings: &'a RenderSettings,
     ) -> ViewWeights<'a> {
-        ViewWeights::new(&mut self.cpu, cloud, camera, settings, true)
+        ViewWeights::drawn(&mut self.cpu, cloud, camera, settings, true)
     }
 
     /// Hands the weight of every Gaussian at every pixel of a view to `sinks`, one for each row of

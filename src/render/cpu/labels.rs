@@ -310,13 +310,13 @@ mod tests {
             let most = expected.iter().map(|p| p.iter().filter(|p| p.1 > 0.0).count()).max();
             assert_eq!(most, Some(COMPETITORS.min(labels as usize)));
             let (camera, apart) = (from(0.0), from(0.3));
-            let mut view = ViewWeights::new(&mut renderer, &cloud, &camera, &settings, false);
+            let mut view = ViewWeights::drawn(&mut renderer, &cloud, &camera, &settings, false);
             let found = label_weights(&mut view, &of).expect("drawn");
             assert!(found == expected, "{labels} labels, bit by bit");
             let groups: Vec<u32> = (0..labels).map(|label| label % 5).collect();
             let winners = label_winners(&mut view, (&of, &groups)).expect("drawn again");
             assert_eq!(winners, expected.iter().map(|p| winner(p, &groups)).collect::<Vec<_>>());
-            let mut view = ViewWeights::new(&mut renderer, &cloud, &apart, &settings, false);
+            let mut view = ViewWeights::drawn(&mut renderer, &cloud, &apart, &settings, false);
             let other = label_weights(&mut view, &of).expect("drawn");
             assert!(other != expected, "the control, of another camera");
         }

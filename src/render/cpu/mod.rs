@@ -11,6 +11,7 @@ pub(crate) mod blend;
 pub(crate) mod blend_backward;
 pub(crate) mod chunk;
 pub(crate) mod contributions;
+pub(crate) mod kept_view;
 pub(crate) mod labels;
 pub mod normals;
 pub(crate) mod pack;
@@ -31,6 +32,7 @@ pub(crate) mod walk;
 use std::sync::Arc;
 
 use self::contributions::ContributionSink;
+use self::kept_view::{KeptView, TileNotes};
 use self::project_backward::GaussianGradient;
 use self::rasterizer::CpuRasterizer;
 use self::splat::Splats;
@@ -235,5 +237,12 @@ impl<R: Real> CpuRenderer<R> {
             self.feature_gradient(i, &mut out.features[i * features.channels..(i + 1) * features.channels]);
         }
         out
+    }
+}
+
+impl CpuRenderer<f32> {
+    /// Keeps the view that was weighed last; `notes` tell by row of tiles whose weights there are.
+    fn keep(&self, notes: &[TileNotes]) -> Option<KeptView> {
+        KeptView::of(&self.splats, notes).filter(|_| self.surfels.is_none())
     }
 }

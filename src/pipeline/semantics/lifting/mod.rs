@@ -28,6 +28,7 @@ pub(crate) mod filters;
 mod floaters;
 pub mod frame_cache;
 pub(crate) mod keep;
+mod kept_views;
 pub(crate) mod mask_cache;
 mod mask_vectors;
 mod mirror;

@@ -4,6 +4,7 @@
 use std::time::Instant;
 
 use super::super::error::FindError;
+use super::super::kept_views::{KEPT_BYTES, KeptViews};
 use super::super::regions::shape::ends_of;
 use super::super::removed::RemovedThings;
 use super::super::view_votes::ViewVotes;
@@ -29,6 +30,7 @@ impl Tracker<'_> {
         let mut counts = ColorCounts::new(self.identities.len());
         let mut terrains = Vec::with_capacity(order.len());
         let (mut of, photos, mut done) = (self.decided(), self.photos, 0);
+        let kept = KeptViews::new(photos.len(), KEPT_BYTES.saturating_sub(self.small.bytes()));
         let known = KnownPixels {
             cloud: self.cloud,
             settings: self.settings,
@@ -36,8 +38,9 @@ impl Tracker<'_> {
             identities: &self.identities,
             of: &of,
             options: &options,
+            kept: &kept,
         };
-        let read = |renderer: &mut Renderer, view: &&ViewReport| known.read(renderer, &photos[view.photo]);
+        let read = |renderer: &mut Renderer, view: &&ViewReport| known.read(renderer, view.photo, &photos[view.photo]);
         self.renderers.each(&order, read, |view, read| {
             match read {
                 Ok((grid, known)) => {
@@ -53,11 +56,11 @@ impl Tracker<'_> {
         self.secs.add(CarryStage::Read, start);
         let start = Instant::now();
         for (i, (photo, grid)) in terrains.iter().enumerate() {
-            let (photo, renderer) = (&photos[*photo], self.renderers.one());
+            let (place, photo, renderer) = (*photo, &photos[*photo], self.renderers.one());
             let camera = photo.camera.limited_to(SIDE_PX);
             let gone = gone::pixels(renderer, self.removed.as_ref(), &camera, self.settings);
             let gone = gone.map_err(|e| undrawn(photo, e))?;
-            let mut view = renderer.weights(self.cloud, &camera, self.settings);
+            let mut view = kept.weights(place, renderer, self.cloud, &camera, self.settings);
             let map = ViewMap::of(&mut view, &of, &self.identities).map_err(|e| undrawn(photo, e))?;
             let known = sure(&map, options.share);
             let mut labels = grow(grid, &known, &colors, &options);
@@ -86,13 +89,15 @@ struct KnownPixels<'a> {
     /// Identity of each Gaussian.
     of: &'a [IdentityId],
     options: &'a GrowOptions,
+    kept: &'a KeptViews,
 }
 
 impl KnownPixels<'_> {
-    /// Returns the terrain of a photo and its known pixels; an error inside if the photo cannot be read.
+    /// Returns the terrain of the photo at `place` and its known pixels; an error inside if the photo cannot be read.
     fn read(
         &self,
         renderer: &mut Renderer,
+        place: usize,
         photo: &Photo,
     ) -> Result<Result<(GrowthGrid, Vec<IdentityId>), IoError>, FindError> {
         let pixels = match io::photo::load(photo, SIDE_PX) {
@@ -102,11 +107,13 @@ impl KnownPixels<'_> {
         let (cloud, settings, camera) = (self.cloud, self.settings, photo.camera.limited_to(SIDE_PX));
         let ends = ends_of(renderer, cloud, settings, &camera);
         let grid = GrowthGrid::new(pixels.width_px as usize, &pixels.rgb, ends.as_deref(), self.options);
-        let mut view = match ends {
+        let view = match ends {
             Some(_) => renderer.weights_of_picture(cloud, &camera, settings),
             None => renderer.weights(cloud, &camera, settings),
         };
+        let mut view = self.kept.watch(view);
         let map = ViewMap::of(&mut view, self.of, self.identities).map_err(|e| undrawn(photo, e))?;
+        self.kept.offer(place, view);
         let mut known = sure(&map, self.options.share);
         let gone = gone::pixels(renderer, self.removed, &camera, settings).map_err(|e| undrawn(photo, e))?;
         gone::forget(&mut known, gone.as_ref());

@@ -19,6 +19,7 @@ pub(crate) use views::ViewReport;
 use super::associate::{Link, conflicts, link};
 use super::error::FindError;
 use super::floaters::drop_floaters;
+use super::kept_views::{KEPT_BYTES, KeptViews};
 use super::mirror::guess;
 use super::propagate::extend;
 use super::removed::RemovedThings;
@@ -70,6 +71,7 @@ pub(crate) fn track(
         settings,
         options,
         renderers: Renderers::new(cloud.len()),
+        small: KeptViews::new(photos.len(), KEPT_BYTES),
         removed: options.removed.as_deref().map(|gone| RemovedThings::new(cloud, gone)),
         identities: options.known.as_ref().map_or_else(Identities::default, |map| map.identities.clone()),
         votes: match &options.known {
@@ -126,6 +128,7 @@ pub(crate) fn track(
         t.votes.decide(&t.identities, LEAST_VOTES)
     };
     let views = t.look(&identities_of(&assignments), observer)?;
+    t.small = KeptViews::new(0, 0);
     if options.by_mirror {
         guess(cloud, &t.identities, &said, &mut assignments, observer)?;
     }
@@ -158,6 +161,8 @@ struct Tracker<'a> {
     settings: &'a RenderSettings,
     options: &'a TrackOptions,
     renderers: Renderers,
+    /// Views of [`SEE_SIDE_PX`], which are looked at after every change of labels.
+    small: KeptViews,
     removed: Option<RemovedThings>,
     identities: Identities,
     votes: Votes,
@@ -176,15 +181,19 @@ impl Tracker<'_> {
     /// Measures the visibility of each Gaussian in every photo, before any votes.
     fn see(&mut self, observer: &mut dyn Observer) -> Result<(), FindError> {
         let (start, mut ticker) = (Instant::now(), Ticker::new("Analyzing photos", self.photos.len()));
-        let (cloud, settings, votes, mut done) = (self.cloud, self.settings, &mut self.votes, 0);
-        let areas = |renderer: &mut Renderer, photo: &Photo| {
-            let camera = photo.camera.limited_to(SEE_SIDE_PX);
-            ViewVotes::areas_of(&mut renderer.weights(cloud, &camera, settings)).map_err(|e| undrawn(photo, e))
+        let photos: Vec<usize> = (0..self.photos.len()).collect();
+        let (cloud, settings, all, small) = (self.cloud, self.settings, self.photos, &self.small);
+        let areas = |renderer: &mut Renderer, photo: &usize| {
+            let camera = all[*photo].camera.limited_to(SEE_SIDE_PX);
+            let mut view = small.watch(renderer.weights(cloud, &camera, settings));
+            let areas = ViewVotes::areas_of(&mut view).map_err(|e| undrawn(&all[*photo], e))?;
+            small.offer(*photo, view);
+            Ok(areas)
         };
-        self.renderers.each(self.photos, areas, |_, areas| {
+        let votes = &mut self.votes;
+        self.renderers.each(&photos, areas, |photo, areas| {
             votes.note(&areas);
-            done += 1;
-            Ok(ticker.tick(done, observer)?)
+            Ok(ticker.tick(photo + 1, observer)?)
         })?;
         self.secs.add(CarryStage::See, start);
         Ok(())
