@@ -33,15 +33,27 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_point_becomes_a_round_blob_of_its_weight() {
-        let mut point = vec![0.0; 21 * 21];
-        point[220] = 1.0;
-        let blob = blur(&point, 21, 1.5);
-        assert!((blob.iter().sum::<f32>() - 1.0).abs() < 1e-5, "{blob:?}");
-        let peak = 1.0 / (std::f32::consts::TAU * 1.5 * 1.5);
-        assert!((blob[220] - peak).abs() < 0.02 * peak, "{} {peak}", blob[220]);
-        let mirrored = |i: usize| i % 21 * 21 + i / 21;
-        assert!((0..441).all(|i| (blob[i] - blob[mirrored(i)]).abs() < 1e-7));
+    fn a_blur_is_the_weighted_sum_of_each_row_and_column() {
+        let (width, height, sigma) = (23, 9, 1.6_f32);
+        let plane: Vec<f32> = (0..width * height).map(|i| (i * 7919 % 101) as f32).collect();
+        let reach = (3.0 * sigma).ceil() as isize;
+        let weight = |d: isize| (-0.5 * (d as f32 / sigma).powi(2)).exp();
+        let all: f32 = (-reach..=reach).map(weight).sum();
+        let at = |x: isize, y: isize| {
+            plane[y.clamp(0, height as isize - 1) as usize * width + x.clamp(0, width as isize - 1) as usize]
+        };
+        let row = |x: isize, y: isize| (-reach..=reach).map(|d| weight(d) / all * at(x + d, y)).sum::<f32>();
+        let both = |x: isize, y: isize| (-reach..=reach).map(|d| weight(d) / all * row(x, y + d)).sum::<f32>();
+        let found = blur(&plane, width, sigma);
+        for (i, v) in found.iter().enumerate() {
+            let expected = both((i % width) as isize, (i / width) as isize);
+            assert!((v - expected).abs() < 1e-3, "{i}: {v} {expected}");
+        }
+        let far = found.iter().zip(&plane).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
+        assert!(far > 10.0, "the control: it is blurred");
+        // Narrower than the blur.
+        assert_eq!(blur(&[3.0; 8], 2, sigma).len(), 8);
+        assert!(blur(&[3.0; 8], 2, sigma).iter().all(|v| (v - 3.0).abs() < 1e-5));
     }
 
     #[test]

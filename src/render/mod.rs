@@ -18,10 +18,12 @@ mod renderer;
 
 pub(crate) use cpu::adam::{AdamStep, Rates};
 pub(crate) use cpu::contributions::ContributionSink;
+pub(crate) use cpu::kept_view::KeptView;
 pub use cpu::labels::LabelWinner;
-pub(crate) use cpu::labels::{PixelWeights, UNKNOWN};
+pub(crate) use cpu::labels::{PixelWeights, UNKNOWN, label_winners};
 pub use cpu::pose_gradient::PoseGradient;
 pub(crate) use cpu::ssim::{LossParts, PhotoLoss, ssim};
+pub(crate) use cpu::view_weights::ViewWeights;
 pub(crate) use cpu::{RenderStats, normals, validate};
 pub(crate) use gpu::timing::StageTimes;
 pub use gpu::trainer::{GpuTrainer, StepLoss, TrainerSettings};

@@ -5,6 +5,7 @@ use std::sync::{Arc, Weak};
 use serde::{Deserialize, Serialize};
 
 use super::cpu::labels::{self, LabelWinner, PixelWeights};
+use super::cpu::view_weights::ViewWeights;
 use super::gpu::{self, Device, DevicePicture, GpuError};
 use super::lod::Cut;
 use super::{ContributionSink, Features, Frame, RenderError, RenderSettings, RenderStats, StageTimes, cpu};
@@ -209,8 +210,7 @@ impl Renderer {
         if let Some(gpu) = self.gpu.as_mut().filter(|gpu| std::ptr::eq(gpu.uploaded.as_ptr(), cloud)) {
             return Ok(gpu.renderer.label_winners((of, groups), camera, settings)?);
         }
-        let weights = self.label_weights(cloud, of, camera, settings)?;
-        Ok(weights.iter().map(|places| labels::winner(places, groups)).collect())
+        Ok(labels::label_winners(&mut self.weights(cloud, camera, settings), (of, groups))?)
     }
 
     /// The labels of largest weight at each pixel, row-major, on the CPU; `of` has a label for each Gaussian of
@@ -222,7 +222,7 @@ impl Renderer {
         camera: &Camera,
         settings: &RenderSettings,
     ) -> Result<Vec<PixelWeights>, RenderError> {
-        labels::label_weights(&mut self.cpu, cloud, of, camera, settings)
+        labels::label_weights(&mut self.weights(cloud, camera, settings), of)
     }
 
     /// Draws a cloud with values of its Gaussians composited like colors, on the CPU.
@@ -234,6 +234,26 @@ impl Renderer {
         settings: &RenderSettings,
     ) -> Result<Frame<f32>, RenderError> {
         self.cpu.render(cloud, features, camera, settings)
+    }
+
+    /// The weights of Gaussians in a view, on the CPU. Surfels count as flat Gaussians.
+    pub(crate) fn weights<'a>(
+        &'a mut self,
+        cloud: &'a GaussianCloud,
+        camera: &'a Camera,
+        settings: &'a RenderSettings,
+    ) -> ViewWeights<'a> {
+        ViewWeights::drawn(&mut self.cpu, cloud, camera, settings, false)
+    }
+
+    /// The same of the view that [`Self::render`] has just drawn, seen alike: the first pass, too, projects nothing.
+    pub(crate) fn weights_of_picture<'a>(
+        &'a mut self,
+        cloud: &'a GaussianCloud,
+        camera: &'a Camera,
+        settings: &'a RenderSettings,
+    ) -> ViewWeights<'a> {
+        ViewWeights::drawn(&mut self.cpu, cloud, camera, settings, true)
     }
 
     /// Hands the weight of every Gaussian at every pixel of a view to `sinks`, one for each row of

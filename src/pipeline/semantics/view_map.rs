@@ -2,7 +2,7 @@
 //!
 //! Rendered once per view; queries only read it.
 
-use crate::render::{DrawError, RenderSettings, Renderer};
+use crate::render::{DrawError, LabelWinner, RenderError, RenderSettings, Renderer, ViewWeights, label_winners};
 use crate::scene::{Camera, GaussianCloud, Identities, IdentityId, Mask};
 
 /// Identities of a view's pixels, row-major.
@@ -35,11 +35,24 @@ impl ViewMap {
         camera: &Camera,
         settings: &RenderSettings,
     ) -> Result<Self, DrawError> {
-        let (width_px, height_px) = (camera.width_px as usize, camera.height_px as usize);
-        let objects: Vec<IdentityId> = (0..=identities.len() as IdentityId).map(|i| identities.object_of(i)).collect();
-        let winners = renderer.label_winners(cloud, (of, &objects), camera, settings)?;
+        let winners = renderer.label_winners(cloud, (of, &objects(identities)), camera, settings)?;
+        Ok(Self::of_winners(camera.width_px as usize, &winners))
+    }
+
+    /// The same on the CPU, of a view that further passes may follow.
+    pub(crate) fn of(
+        view: &mut ViewWeights<'_>,
+        of: &[IdentityId],
+        identities: &Identities,
+    ) -> Result<Self, RenderError> {
+        let winners = label_winners(view, (of, &objects(identities)))?;
+        Ok(Self::of_winners(view.size_px()[0], &winners))
+    }
+
+    fn of_winners(width_px: usize, winners: &[LabelWinner]) -> Self {
+        let height_px = winners.len() / width_px.max(1);
         let (identity, (share, alpha)) = winners.iter().map(|w| (w.label, (w.share, w.alpha))).unzip();
-        Ok(Self { width_px, height_px, identity, share, alpha })
+        Self { width_px, height_px, identity, share, alpha }
     }
 
     /// Returns the pixels of an identity and its pieces.
@@ -49,6 +62,11 @@ impl ViewMap {
             inside.get(self.identity[i] as usize).copied().unwrap_or(false)
         })
     }
+}
+
+/// The object of each identity.
+fn objects(identities: &Identities) -> Vec<IdentityId> {
+    (0..=identities.len() as IdentityId).map(|i| identities.object_of(i)).collect()
 }
 
 #[cfg(test)]

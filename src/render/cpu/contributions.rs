@@ -7,11 +7,17 @@ use crate::math::lanes::{LANES, Lane, Lanes};
 use crate::render::TILE_PX;
 
 /// Takes the weights of one row of tiles.
-pub(crate) trait ContributionSink<R>: Send {
+pub(crate) trait ContributionSink<R: Real>: Send {
     /// `gaussian` contributes `weights` to the pixels of row `y` from column `x` on; zeros where it
     /// does not, also beyond the picture's right edge. Calls come tile after tile, front to back
     /// in each, all of a Gaussian in a tile together.
     fn add(&mut self, gaussian: u32, x: usize, y: usize, weights: &Lane<R>);
+
+    /// [`Self::add`] for sinks that go on computing with vectors.
+    #[inline(always)]
+    fn add_lanes<L: Lanes<R>>(&mut self, l: L, gaussian: u32, x: usize, y: usize, weights: L::V) {
+        self.add(gaussian, x, y, &l.store(weights));
+    }
 }
 
 /// Hands the weights of a row of tiles on.
@@ -50,7 +56,7 @@ impl<R: Real, P: Primitive<R>, L: Lanes<R>, S: ContributionSink<R>> Sink<R, P, L
     fn add(&mut self, l: L, slot: usize, gaussian: &u32, _: &P::Hit<L>, [weight, ..]: [L::V; 3]) {
         if l.bits(l.gt(weight, l.splat(R::ZERO))) != 0 {
             let [x, y] = self.tile.corner;
-            self.sink.add(*gaussian, x + slot / TILE_PX * LANES, y + slot % TILE_PX, &l.store(weight));
+            self.sink.add_lanes(l, *gaussian, x + slot / TILE_PX * LANES, y + slot % TILE_PX, weight);
         }
     }
 }

@@ -11,6 +11,7 @@ pub(crate) mod blend;
 pub(crate) mod blend_backward;
 pub(crate) mod chunk;
 pub(crate) mod contributions;
+pub(crate) mod kept_view;
 pub(crate) mod labels;
 pub mod normals;
 pub(crate) mod pack;
@@ -25,11 +26,13 @@ pub(crate) mod splat;
 pub mod ssim;
 pub(crate) mod surfel;
 pub(crate) mod validate;
+pub(crate) mod view_weights;
 pub(crate) mod walk;
 
 use std::sync::Arc;
 
 use self::contributions::ContributionSink;
+use self::kept_view::{KeptView, TileNotes};
 use self::project_backward::GaussianGradient;
 use self::rasterizer::CpuRasterizer;
 use self::splat::Splats;
@@ -158,6 +161,22 @@ impl<R: Real> CpuRenderer<R> {
         Ok(self.splats.contributions(cloud, camera, &settings, sinks)?)
     }
 
+    /// [`Self::contributions`] without projecting, binning and sorting, if the last frame was of this cloud and camera,
+    /// seen alike ([`RenderSettings::sees_like`]).
+    pub(crate) fn contributions_again<S: ContributionSink<R>>(
+        &mut self,
+        cloud: &GaussianCloud<R>,
+        camera: &Camera,
+        settings: &RenderSettings,
+        sinks: &mut [S],
+    ) -> Result<(), RenderError> {
+        // Surfels do not have the weights of Gaussians.
+        match self.surfels.is_none() && self.splats.contributions_again(sinks) {
+            true => Ok(()),
+            false => self.contributions(cloud, camera, settings, sinks),
+        }
+    }
+
     /// Backward pass over the tiles of the last frame. Afterwards [`Self::gaussian_gradient`]
     /// answers for each Gaussian. Does nothing before the first frame.
     pub(crate) fn backward_tiles(&mut self, gradient: &FrameGradient<R>) {
@@ -218,5 +237,12 @@ impl<R: Real> CpuRenderer<R> {
             self.feature_gradient(i, &mut out.features[i * features.channels..(i + 1) * features.channels]);
         }
         out
+    }
+}
+
+impl CpuRenderer<f32> {
+    /// Keeps the view that was weighed last; `notes` tell by row of tiles whose weights there are.
+    fn keep(&self, notes: &[TileNotes]) -> Option<KeptView> {
+        KeptView::of(&self.splats, notes).filter(|_| self.surfels.is_none())
     }
 }

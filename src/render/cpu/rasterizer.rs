@@ -29,13 +29,15 @@ const MOST: usize = MAX_CHANNELS + 16;
 /// A rasterizer with its buffers, to be kept from frame to frame.
 #[derive(Debug)]
 pub(crate) struct CpuRasterizer<R, P> {
-    lists: Lists<R>,
+    lists: SplatLists<R>,
     pixels: Pixels<R>,
     /// For each Gaussian its splat, or `NONE`; filled by the backward pass.
     splat_of: Vec<u32>,
     /// Sums of the backward pass, for each tile entry.
     pub(crate) records: Vec<R>,
     frame: Option<FrameInfo<R, P>>,
+    /// State of the last frame of which only the weights were wanted.
+    weighed: Option<FrameInfo<R, P>>,
     /// Cut that is drawn instead of clouds that it fits.
     pub(crate) cut: Option<Arc<Cut<R>>>,
     /// True if nothing is kept for a backward pass, which then does nothing.
@@ -46,14 +48,14 @@ pub(crate) struct CpuRasterizer<R, P> {
 
 /// The splats of a frame, and by tile.
 #[derive(Debug, Default)]
-struct Lists<R> {
-    parts: Vec<Chunk<R>>,
+pub(super) struct SplatLists<R> {
+    pub(super) parts: Vec<Chunk<R>>,
     /// The order that the last frame kept, if it kept one.
-    kept: Option<KeptOrder>,
-    tiles: Tiles,
+    pub(super) kept: Option<KeptOrder>,
+    pub(super) tiles: Tiles,
 }
 
-impl<R: Real> Lists<R> {
+impl<R: Real> SplatLists<R> {
     /// Row `ty` of tiles.
     fn row<P: Primitive<R>>(&self, info: &FrameInfo<R, P>, ty: usize) -> TileRow<'_, R, P> {
         TileRow {
@@ -64,6 +66,13 @@ impl<R: Real> Lists<R> {
             ty,
             least: R::of(P::least_transmittance(&info.settings)),
         }
+    }
+
+    /// Hands the weight of every Gaussian at every pixel to `sinks`, one for each row of tiles.
+    pub(super) fn weigh<P: Primitive<R>, S: ContributionSink<R>>(&self, info: &FrameInfo<R, P>, sinks: &mut [S]) {
+        sinks.par_iter_mut().take(self.tiles.grid[1]).enumerate().for_each(|(ty, sink)| {
+            P::run(info.channels, ContributionRow { row: self.row(info, ty), sink });
+        });
     }
 }
 
@@ -77,24 +86,25 @@ struct Pixels<R> {
 
 /// State of the forward pass that the backward pass needs.
 #[derive(Debug, Clone)]
-struct FrameInfo<R, P> {
+pub(super) struct FrameInfo<R, P> {
     primitive: P,
-    view: CameraView<R>,
+    pub(super) view: CameraView<R>,
     settings: RenderSettings,
-    gaussians: usize,
+    pub(super) gaussians: usize,
     extra: usize,
-    channels: usize,
+    pub(super) channels: usize,
 }
 
 impl<R: Real, P> Default for CpuRasterizer<R, P> {
     fn default() -> Self {
-        let (lists, pixels) = (Lists::default(), Pixels::default());
+        let (lists, pixels) = (SplatLists::default(), Pixels::default());
         Self {
             lists,
             pixels,
             splat_of: Vec::new(),
             records: Vec::new(),
             frame: None,
+            weighed: None,
             cut: None,
             forward_only: false,
             stats: RenderStats::default(),
@@ -119,7 +129,7 @@ impl<R: Real, P: Primitive<R>> CpuRasterizer<R, P> {
         fn of<T>(v: &Vec<T>) -> usize {
             v.capacity() * size_of::<T>()
         }
-        let Lists { parts, tiles, .. } = &self.lists;
+        let SplatLists { parts, tiles, .. } = &self.lists;
         let Pixels { transmittance, last, kept } = &self.pixels;
         let parts: usize = parts.iter().map(|p| of(&p.splats) + of(&p.values)).sum();
         let tiles = of(&tiles.first) + of(&tiles.entries) + of(&tiles.span) + of(&tiles.ways_back);
@@ -142,12 +152,12 @@ impl<R: Real, P: Primitive<R>> CpuRasterizer<R, P> {
         camera: &Camera,
         settings: &RenderSettings,
     ) -> Result<(FrameInfo<R, P>, [f64; 3]), NotFinite> {
-        self.frame = None;
+        (self.frame, self.weighed) = (None, None);
         let cut = self.cut.as_deref().filter(|cut| cut.fits(cloud));
         let extra = features.channels;
         let channels = P::padded(P::channels(extra, settings.depth));
         let view = CameraView::new(camera, cloud.origin, settings.near);
-        let Lists { parts, kept, tiles } = &mut self.lists;
+        let SplatLists { parts, kept, tiles } = &mut self.lists;
         let mut clock = Instant::now();
         // Nodes that stand for the same Gaussian cannot be told apart from picture to picture.
         let keeps = settings.keep_order && cut.is_none();
@@ -229,11 +239,19 @@ impl<R: Real, P: Primitive<R>> CpuRasterizer<R, P> {
         sinks: &mut [S],
     ) -> Result<(), NotFinite> {
         let (info, _) = self.prepare(cloud, Features::NONE, camera, settings)?;
-        let lists = &self.lists;
-        sinks.par_iter_mut().take(lists.tiles.grid[1]).enumerate().for_each(|(ty, sink)| {
-            P::run(info.channels, ContributionRow { row: lists.row(&info, ty), sink });
-        });
+        self.weighed = Some(info);
+        self.contributions_again(sinks);
         Ok(())
+    }
+
+    /// The same of the frame drawn or weighed last; returns whether there is one.
+    pub(crate) fn contributions_again<S: ContributionSink<R>>(&self, sinks: &mut [S]) -> bool {
+        self.last().map(|(lists, info)| lists.weigh(info, sinks)).is_some()
+    }
+
+    /// The frame drawn or weighed last.
+    pub(super) fn last(&self) -> Option<(&SplatLists<R>, &FrameInfo<R, P>)> {
+        Some((&self.lists, self.frame.as_ref().or(self.weighed.as_ref())?))
     }
 
     /// Backward pass over the tiles of the last frame; does nothing before the first, nor where none was kept.

@@ -6,7 +6,7 @@
 //! 1. [`segmenter`] finds the masks of a photo: in files, by a network ([`network_segmenter`]), or as [`regions`] of
 //!    even color. [`filters`] sort masks into objects and parts.
 //! 2. [`tracker`] makes masks identities over all views: by the Gaussians, or by [`sam2_tracker`] from photo to photo.
-//! 3. [`votes`] give every Gaussian its identity; [`splat_tree`] labels Gaussians without votes by the things that they
+//! 3. [`votes`], of each view by [`view_votes`], give every Gaussian its identity; [`splat_tree`] labels Gaussians without votes by the things that they
 //!    belong to, [`mirror`] by the other side of these.
 //! 4. [`codes`] give every identity its point in code space; [`train_codes`] trains the codes of Gaussians instead, as
 //!    in the paper.
@@ -28,6 +28,7 @@ pub(crate) mod filters;
 mod floaters;
 pub mod frame_cache;
 pub(crate) mod keep;
+mod kept_views;
 pub(crate) mod mask_cache;
 mod mask_vectors;
 mod mirror;
@@ -37,10 +38,12 @@ mod prompt_points;
 pub(crate) mod propagate;
 pub mod regions;
 pub(crate) mod removed;
+mod renderers;
 pub(crate) mod sam2_tracker;
 pub mod segmenter;
 pub(crate) mod splat_tree;
 mod track_cache;
 pub(crate) mod tracker;
 pub(crate) mod train_codes;
+mod view_votes;
 pub(crate) mod votes;

@@ -1,12 +1,11 @@
 //! Closed-form lifting: every Gaussian takes the weighted vote of the pixels it contributed to
 //! (weight = alpha x transmittance), which gives its identity at all levels in one pass.
 
-use glam::DVec3;
 use rayon::prelude::*;
 
+use super::view_votes::ViewVotes;
 use crate::math::finite::{CHECKED, all_finite};
-use crate::math::lanes::Lane;
-use crate::render::{self, ContributionSink, RenderError, RenderSettings, Renderer, TILE_PX};
+use crate::render::{self, RenderError, RenderSettings, Renderer};
 use crate::scene::{Camera, GaussianCloud, Identities, IdentityId, NO_IDENTITY, SemanticMap};
 
 /// Label of an unknown pixel.
@@ -77,6 +76,11 @@ impl Votes {
 
     /// Records the area of each Gaussian in a view. If a Gaussian is seen much worse in a view than elsewhere, it is
     /// occluded there, and the photo's labels do not apply to it.
+    pub(crate) fn note(&mut self, areas: &[f32]) {
+        self.best.iter_mut().zip(areas).for_each(|(best, area)| *best = best.max(*area));
+    }
+
+    /// Draws a view, and records the areas in it.
     pub(crate) fn see(
         &mut self,
         renderer: &mut Renderer,
@@ -84,31 +88,11 @@ impl Votes {
         camera: &Camera,
         settings: &RenderSettings,
     ) -> Result<(), RenderError> {
-        let labels = vec![UNKNOWN; camera.width_px as usize * camera.height_px as usize];
-        let found = self.found(renderer, cloud, camera, settings, &labels)?;
-        let areas = areas(cloud, camera, &found);
-        self.best.iter_mut().zip(areas).for_each(|(best, area)| *best = best.max(area));
+        self.note(&ViewVotes::areas_of(&mut renderer.weights(cloud, camera, settings))?);
         Ok(())
     }
 
-    fn found(
-        &self,
-        renderer: &mut Renderer,
-        cloud: &GaussianCloud,
-        camera: &Camera,
-        settings: &RenderSettings,
-        labels: &[IdentityId],
-    ) -> Result<Vec<(u32, IdentityId, f32)>, RenderError> {
-        let (width, height) = (camera.width_px as usize, camera.height_px as usize);
-        assert_eq!(labels.len(), width * height, "one label per pixel");
-        let row = || Row { labels, width, gaussian: u32::MAX, sums: Vec::new(), found: Vec::new() };
-        let mut rows: Vec<Row<'_>> = (0..height.div_ceil(TILE_PX)).map(|_| row()).collect();
-        renderer.contributions(cloud, camera, settings, &mut rows)?;
-        rows.iter_mut().for_each(Row::finish);
-        Ok(rows.into_iter().flat_map(|r| r.found).collect())
-    }
-
-    /// Adds the votes of one view. `labels` holds the innermost identity of each pixel, row-major.
+    /// Draws a view, and adds its votes. `labels` holds the innermost identity of each pixel, row-major.
     pub(crate) fn add_view(
         &mut self,
         renderer: &mut Renderer,
@@ -117,11 +101,14 @@ impl Votes {
         settings: &RenderSettings,
         labels: &[IdentityId],
     ) -> Result<(), RenderError> {
-        let found = self.found(renderer, cloud, camera, settings, labels)?;
-        let areas = areas(cloud, camera, &found);
-        for (gaussian, identity, weight) in found.into_iter().filter(|f| f.1 != UNKNOWN) {
+        self.add(&ViewVotes::of(&mut renderer.weights(cloud, camera, settings), labels)?)
+    }
+
+    /// Adds the votes of one view.
+    pub(crate) fn add(&mut self, view: &ViewVotes) -> Result<(), RenderError> {
+        for (gaussian, identity, weight) in view.all().filter(|f| f.1 != UNKNOWN) {
             let g = gaussian as usize;
-            if areas[g] >= self.least_seen * self.best[g] {
+            if view.areas[g] >= self.least_seen * self.best[g] {
                 add(&mut self.by_gaussian[g], identity, weight);
             }
         }
@@ -140,8 +127,12 @@ impl Votes {
         let by = |gains: &[f32]| -> Vec<Assignment> {
             self.by_gaussian.par_iter().map(|votes| decide(votes, &objects, gains, least)).collect()
         };
-        let plain = by(&vec![1.0; objects.len()]);
-        by(&self.gains(&plain, &objects))
+        let mut decided = by(&vec![1.0; objects.len()]);
+        let gains = self.gains(&decided, &objects);
+        // Where there is no choice, gains change nothing.
+        let contested = decided.par_iter_mut().zip(&self.by_gaussian).filter(|(_, votes)| votes.len() > 1);
+        contested.for_each(|(now, votes)| *now = decide(votes, &objects, &gains, least));
+        decided
     }
 
     /// Factors for the votes of each identity against others of its object, from the `plain` decisions.
@@ -172,19 +163,6 @@ impl Votes {
     }
 }
 
-/// Weight of each Gaussian in a view as an area in square units, so that near and far views compare.
-fn areas(cloud: &GaussianCloud, camera: &Camera, found: &[(u32, IdentityId, f32)]) -> Vec<f32> {
-    let mut areas = vec![0.0; cloud.len()];
-    found.iter().for_each(|f| areas[f.0 as usize] += f.2);
-    let axis = camera.world_from_camera * DVec3::Z;
-    let focal = camera.focal_px.x * camera.focal_px.y;
-    for (area, p) in areas.iter_mut().zip(&cloud.positions).filter(|(a, _)| **a > 0.0) {
-        let depth = (cloud.origin + DVec3::from(p.map(f64::from)) - camera.center).dot(axis);
-        *area *= (depth * depth / focal) as f32;
-    }
-    areas
-}
-
 fn add(votes: &mut Vec<(IdentityId, f32)>, identity: IdentityId, weight: f32) {
     if let Some(v) = votes.iter_mut().find(|v| v.0 == identity) {
         v.1 += weight;
@@ -200,15 +178,23 @@ fn decide(votes: &[(IdentityId, f32)], objects: &[IdentityId], gains: &[f32], le
     if !(total > 0.0 && total >= least) {
         return Assignment { identity: UNKNOWN, margin: 0.0 };
     }
+    if let [(identity, _)] = *votes {
+        return Assignment { identity, margin: 1.0 };
+    }
     let object_of = |id: IdentityId| objects.get(id as usize).copied().unwrap_or(NO_IDENTITY);
-    let mut sums: Vec<(IdentityId, f32)> = Vec::with_capacity(votes.len());
+    // Objects are at most as many as the identities that are kept.
+    let (mut sums, mut count) = ([(NO_IDENTITY, 0.0_f32); KEPT], 0);
     for &(id, weight) in votes {
         let object = object_of(id);
-        match sums.iter_mut().find(|s| s.0 == object) {
+        match sums[..count].iter_mut().find(|s| s.0 == object) {
             Some(s) => s.1 += weight,
-            None => sums.push((object, weight)),
+            None => {
+                sums[count] = (object, weight);
+                count += 1;
+            }
         }
     }
+    let sums = &mut sums[..count];
     sums.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
     let object = sums[0].0;
     let gained = |v: &(IdentityId, f32)| v.1 * gains.get(v.0 as usize).unwrap_or(&1.0);
@@ -218,43 +204,10 @@ fn decide(votes: &[(IdentityId, f32)], objects: &[IdentityId], gains: &[f32], le
     Assignment { identity, margin: (sums[0].1 - second) / total }
 }
 
-/// Collects the votes of one row of tiles.
-struct Row<'a> {
-    labels: &'a [IdentityId],
-    width: usize,
-    /// Gaussian whose votes are being summed.
-    gaussian: u32,
-    sums: Vec<(IdentityId, f32)>,
-    found: Vec<(u32, IdentityId, f32)>,
-}
-
-impl Row<'_> {
-    fn finish(&mut self) {
-        let gaussian = self.gaussian;
-        self.found.extend(self.sums.drain(..).map(|(id, weight)| (gaussian, id, weight)));
-    }
-}
-
-impl ContributionSink<f32> for Row<'_> {
-    fn add(&mut self, gaussian: u32, x: usize, y: usize, weights: &Lane<f32>) {
-        if gaussian != self.gaussian {
-            self.finish();
-            self.gaussian = gaussian;
-        }
-        let end = (x + weights.len()).min(self.width);
-        for (&label, &weight) in self.labels[y * self.width + x..y * self.width + end].iter().zip(weights) {
-            if weight > 0.0 {
-                match self.sums.iter_mut().find(|s| s.0 == label) {
-                    Some(s) => s.1 += weight,
-                    None => self.sums.push((label, weight)),
-                }
-            }
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
+    use glam::DVec3;
+
     use super::*;
     use crate::scene::Level;
 
@@ -382,15 +335,5 @@ mod tests {
         );
         assert_eq!(b[2], Assignment { identity: UNKNOWN, margin: 0.0 });
         assert_eq!(b[1].margin, 1.0);
-        // A row of tiles that ends within a vector: the overhang is ignored.
-        let labels = [1, 1, 2, UNKNOWN];
-        let mut row = Row { labels: &labels, width: 4, gaussian: u32::MAX, sums: vec![], found: vec![] };
-        row.add(7, 2, 0, &[0.5; 8]);
-        row.add(7, 0, 0, &[0.25, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]);
-        row.add(8, 0, 0, &[1.0; 8]);
-        row.finish();
-        row.found.retain(|f| f.2 > 0.0);
-        let all = [(7, 2, 0.5), (7, UNKNOWN, 0.5), (7, 1, 0.25), (8, 1, 2.0), (8, 2, 1.0), (8, UNKNOWN, 1.0)];
-        assert_eq!(row.found, all);
     }
 }

@@ -1,11 +1,17 @@
 //! Perceptual colors: CIELAB, D65.
 
+use rayon::prelude::*;
+
 use crate::math::srgb::linear as linear_light;
+
+/// Fewest pixels that are worth a task.
+const SOME_PX: usize = 4_096;
 
 /// L* a* b* of sRGB bytes.
 pub(crate) fn lab(rgb: &[[u8; 3]]) -> Vec<[f32; 3]> {
     let linear: Vec<f32> = (0..=255_u8).map(|v| linear_light(f32::from(v) / 255.0)).collect();
-    rgb.iter()
+    rgb.par_iter()
+        .with_min_len(SOME_PX)
         .map(|p| {
             let [r, g, b] = p.map(|v| linear[usize::from(v)]);
             let x = (0.412_456_4 * r + 0.357_576_1 * g + 0.180_437_5 * b) / 0.950_47;

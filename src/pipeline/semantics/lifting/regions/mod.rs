@@ -19,7 +19,7 @@ use super::filters::{self, FilterOptions, Kept};
 use super::segmenter::{FoundMask, Segmenter, with_parts};
 use crate::io;
 use crate::pipeline::observer::Observer;
-use crate::render::RenderSettings;
+use crate::render::{RenderSettings, Renderer};
 use crate::scene::{GaussianCloud, Mask, Photo};
 
 /// The built-in segmenter. It covers every photo.
@@ -43,7 +43,8 @@ impl Segmenter for Regions<'_> {
     fn segment(&mut self, photo: &Photo, max_side_px: u32, _: &mut dyn Observer) -> Result<Vec<FoundMask>, FindError> {
         let pixels = io::photo::load(photo, max_side_px)?;
         let camera = photo.camera.limited_to(max_side_px);
-        let ends = self.trained.and_then(|(cloud, settings)| shape::ends_of(cloud, settings, &camera));
+        let ends =
+            self.trained.and_then(|(cloud, settings)| shape::ends_of(&mut Renderer::new(), cloud, settings, &camera));
         let picture = Picture {
             width: pixels.width_px as usize,
             rgb: &pixels.rgb,

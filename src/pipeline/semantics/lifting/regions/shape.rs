@@ -21,10 +21,15 @@ const FOLD: f32 = 1.4;
 /// Slopes, as relative depth per tangent, that may be and certainly are a jump to another surface behind.
 const JUMP: [f32; 2] = [12.0, 37.0];
 
-/// Returns the end of a surface at each pixel of a view, 0 to 1; `None` if the view cannot be rendered.
-pub(crate) fn ends_of(cloud: &GaussianCloud, settings: &RenderSettings, camera: &Camera) -> Option<Vec<f32>> {
+/// Draws a view, and returns the end of a surface at each of its pixels, 0 to 1; `None` if it cannot be drawn.
+pub(crate) fn ends_of(
+    renderer: &mut Renderer,
+    cloud: &GaussianCloud,
+    settings: &RenderSettings,
+    camera: &Camera,
+) -> Option<Vec<f32>> {
     let settings = RenderSettings { depth: true, sh_degree: 0, ..settings.clone() };
-    let frame = Renderer::new().render(cloud, Features::NONE, camera, &settings).ok()?;
+    let frame = renderer.render(cloud, Features::NONE, camera, &settings).ok()?;
     let depth = |(&d, &a): (&f32, &f32)| if a >= SOLID { d / a } else { 0.0 };
     let depth: Vec<f32> = frame.depth.iter().zip(&frame.alpha).map(depth).collect();
     Some(ends(&depth, frame.width_px, 0.5 * (camera.focal_px.x + camera.focal_px.y)))
@@ -53,7 +58,11 @@ pub(crate) fn ends(depth: &[f32], width: usize, focal_px: f64) -> Vec<f32> {
                 let tangent = step as f32 * ((dx * dx + dy * dy) as f32).sqrt() / focal_px as f32;
                 // Nearer on both sides than a plane through here: hollow.
                 let fold = (a + b - 2.0 * here) / (2.0 * here * tangent) / FOLD;
-                let jump = ((a / b).ln().abs() / (2.0 * tangent) - JUMP[0]) / (JUMP[1] - JUMP[0]);
+                // The logarithm of a ratio is at most the ratio minus one, so small ones are no jump.
+                let jump = match (a - b).abs() < 1.98 * tangent * JUMP[0] * a.min(b) {
+                    true => 0.0,
+                    false => ((a / b).ln().abs() / (2.0 * tangent) - JUMP[0]) / (JUMP[1] - JUMP[0]),
+                };
                 *out = out.max(fold.max(jump).clamp(0.0, 1.0));
             }
         }
@@ -118,7 +127,7 @@ mod tests {
         let camera =
             Camera::look_at(glam::DVec3::new(0.0, 0.0, -4.0), glam::DVec3::ZERO, glam::DVec3::NEG_Y, 0.8, 90, 60)
                 .expect("valid");
-        let ends = ends_of(&cloud, &RenderSettings::default(), &camera).expect("drawn");
+        let ends = ends_of(&mut Renderer::new(), &cloud, &RenderSettings::default(), &camera).expect("drawn");
         let frame = Renderer::new().render(&cloud, Features::NONE, &camera, &RenderSettings::default()).expect("drawn");
         let last = (0..90).rfind(|x| frame.alpha[30 * 90 + x] >= SOLID).expect("seen");
         assert!((50..80).contains(&last), "{last}");
@@ -127,6 +136,6 @@ mod tests {
         assert!(edge > 0.9 && row[45] < 0.05 && row[88] < 0.05, "{last}: {row:?}");
         let mut broken = camera;
         broken.width_px = 0;
-        assert_eq!(ends_of(&cloud, &RenderSettings::default(), &broken), None);
+        assert_eq!(ends_of(&mut Renderer::new(), &cloud, &RenderSettings::default(), &broken), None);
     }
 }

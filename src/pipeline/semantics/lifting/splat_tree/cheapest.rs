@@ -1,6 +1,7 @@
 //! Cheapest labels of the nodes of a tree: each node costs by its label, and by a border to its parent with another.
 
-use super::hierarchy::{Hierarchy, LEAF_STEP};
+use super::hierarchy::Hierarchy;
+use super::leaves::LEAF_STEP;
 use crate::pipeline::semantics::lifting::regions::tree::Node;
 
 impl Hierarchy {

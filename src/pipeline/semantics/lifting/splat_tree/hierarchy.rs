@@ -2,19 +2,15 @@
 
 use std::collections::BTreeMap;
 
+use super::leaves::{borders, leaves};
 use super::marks::{StrokeMark, StrokeMarks};
 use super::surface::SplatSurface;
-use crate::math::disjoint::root;
 use crate::pipeline::observer::Observer;
 use crate::pipeline::semantics::lifting::error::FindError;
 use crate::pipeline::semantics::lifting::regions::segment::unlike;
-use crate::pipeline::semantics::lifting::regions::tree::{Border, Piece, Tree, grow};
+use crate::pipeline::semantics::lifting::regions::tree::{Piece, Tree, grow};
 use crate::render::RenderSettings;
 use crate::scene::{Camera, GaussianCloud};
-
-/// Most Gaussians of a leaf, and their largest difference, in Lab steps.
-const LEAF: usize = 16;
-pub(super) const LEAF_STEP: f64 = 3.0;
 
 /// Corrected Gaussians of something known.
 #[derive(Clone, Debug, PartialEq)]
@@ -62,13 +58,7 @@ impl Hierarchy {
             whole.area += piece.area;
             whole.sums.iter_mut().zip(&piece.sums).for_each(|(s, p)| *s += p);
         }
-        let mut borders: BTreeMap<(u32, u32), Border> = BTreeMap::new();
-        for (&(a, b), border) in surface.edges.iter().zip(&surface.borders) {
-            let (a, b) = (leaf[a as usize], leaf[b as usize]);
-            if a != b {
-                borders.entry((a.min(b), a.max(b))).or_default().add(border);
-            }
-        }
+        let borders = borders(surface, &leaf);
         let unit = pieces.iter().map(|p| p.area).sum::<f64>() / 1000.0;
         let tree = grow(pieces, borders, &move |a, b, border| unlike(a, b, border, true, unit));
         Self { leaf, leaves: count, tree, area: surface.pieces.iter().map(|p| p.area).collect() }
@@ -185,41 +175,6 @@ const KNOWN: f64 = 16.0;
 const KNOWN_BY_CLICK: f64 = 0.1;
 /// The same for a click that corrects something known, from the first that is enough.
 const CORRECTED_BY_CLICK: [f64; 5] = [KNOWN_BY_CLICK, 0.4, 1.6, 6.4, KNOWN];
-
-/// Groups Gaussians that look the same; returns the leaf of each, and the number of leaves.
-fn leaves(surface: &SplatSurface) -> (Vec<u32>, usize) {
-    let mut order: Vec<(f64, usize)> = (surface.edges.iter().zip(&surface.borders).enumerate())
-        .map(|(i, (&(a, b), border))| {
-            let [a, b] = [a, b].map(|g| &surface.pieces[g as usize]);
-            (unlike(a, b, border, true, a.area.min(b.area)), i)
-        })
-        .filter(|(step, _)| *step <= LEAF_STEP)
-        .collect();
-    order.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-    let mut of: Vec<u32> = (0..surface.pieces.len() as u32).collect();
-    let mut size = vec![1_usize; of.len()];
-    for (_, edge) in order {
-        let (a, b) = surface.edges[edge];
-        let (a, b) = (root(&mut of, a), root(&mut of, b));
-        let together = size[a as usize] + size[b as usize];
-        if a != b && together <= LEAF {
-            of[b as usize] = a;
-            size[a as usize] = together;
-        }
-    }
-    let mut number = vec![u32::MAX; of.len()];
-    let mut count = 0;
-    let leaf = (0..of.len() as u32).map(|i| {
-        let root = root(&mut of, i) as usize;
-        if number[root] == u32::MAX {
-            number[root] = count;
-            count += 1;
-        }
-        number[root]
-    });
-    let leaf: Vec<u32> = leaf.collect();
-    (leaf, count as usize)
-}
 
 #[cfg(test)]
 pub(super) mod tests {

@@ -12,6 +12,7 @@
 mod cheapest;
 pub(crate) mod hierarchy;
 mod labels;
+mod leaves;
 pub(crate) mod marks;
 pub(crate) mod stored;
 mod surface;

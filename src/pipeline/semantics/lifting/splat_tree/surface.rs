@@ -10,6 +10,7 @@ use super::super::regions::edges::{ImagePlanes, strength};
 use super::super::regions::lab::{lab, planes};
 use super::super::regions::shape::ends;
 use super::super::regions::tree::{Border, Piece};
+use super::super::renderers::Renderers;
 use crate::math::lanes::Lane;
 use crate::pipeline::observer::{Observer, Ticker};
 use crate::render::{ContributionSink, Features, RenderError, RenderSettings, Renderer, TILE_PX};
@@ -55,16 +56,21 @@ impl SplatSurface {
         settings: &RenderSettings,
         observer: &mut dyn Observer,
     ) -> Result<Self, FindError> {
-        let chosen: Vec<&Camera> = spread(cameras.len(), MOST_VIEWS).map(|i| &cameras[i]).collect();
+        let chosen: Vec<usize> = spread(cameras.len(), MOST_VIEWS).collect();
         let mut ticker = Ticker::new("Preparing selection", chosen.len() + 1);
         let mut colors = vec![[0.0_f32; 4]; cloud.len()];
-        let mut looks = Vec::with_capacity(chosen.len());
-        let mut renderer = Renderer::new();
-        for (i, camera) in chosen.into_iter().enumerate() {
-            let look = look(&mut renderer, cloud, &camera.limited_to(SIDE_PX), settings, &mut colors);
-            looks.push(look.map_err(|e| FindError::Render((i + 1).to_string(), e.into()))?);
-            ticker.tick(i + 1, observer)?;
-        }
+        let mut looks: Vec<Look> = Vec::with_capacity(chosen.len());
+        let draw = |renderer: &mut Renderer, i: &usize| {
+            let seen = look(renderer, cloud, &cameras[*i].limited_to(SIDE_PX), settings);
+            seen.map_err(|e| FindError::Render((i + 1).to_string(), e.into()))
+        };
+        Renderers::new(cloud.len()).each(&chosen, draw, |_, (look, sums)| {
+            for (gaussian, sums) in sums.iter().flatten() {
+                colors[*gaussian as usize].iter_mut().zip(sums).for_each(|(c, s)| *c += s);
+            }
+            looks.push(look);
+            Ok(ticker.tick(looks.len(), observer)?)
+        })?;
         let mut best = vec![0.0_f32; cloud.len()];
         for look in &looks {
             best.iter_mut().zip(&look.areas).for_each(|(b, a)| *b = b.max(*a));
@@ -87,47 +93,48 @@ fn spread(n: usize, most: usize) -> impl Iterator<Item = usize> {
     (0..taken).map(move |k| (2 * k + 1) * n / (2 * taken))
 }
 
+/// By row of tiles: Gaussian, and the sums of its weight and its colors.
+type ColorSums = Vec<Vec<(u32, [f32; 4])>>;
+
 fn look(
     renderer: &mut Renderer,
     cloud: &GaussianCloud,
     camera: &Camera,
     settings: &RenderSettings,
-    colors: &mut [[f32; 4]],
-) -> Result<Look, RenderError> {
+) -> Result<(Look, ColorSums), RenderError> {
     let frame = renderer.render(cloud, Features::NONE, camera, &RenderSettings { depth: true, ..settings.clone() })?;
     let (width, height) = (frame.width_px, frame.height_px);
     let channels = planes(&lab(&frame.to_rgb8()));
     let depth = |(&d, &a): (&f32, &f32)| if a >= SOLID { d / a } else { 0.0 };
     let depth: Vec<f32> = frame.depth.iter().zip(&frame.alpha).map(depth).collect();
-    let row = || Row { channels: &channels, width, gaussian: u32::MAX, sums: [0.0; 4], found: Vec::new() };
+    let [l, a, b] = &channels;
+    let pixels: Vec<[f32; 4]> = l.iter().zip(a).zip(b).map(|((l, a), b)| [1.0, *l, *a, *b]).collect();
+    let row = || Row { pixels: &pixels, width, gaussian: u32::MAX, sums: [0.0; 4], found: Vec::new() };
     let mut rows: Vec<Row<'_>> = (0..height.div_ceil(TILE_PX)).map(|_| row()).collect();
-    renderer.contributions(cloud, camera, settings, &mut rows)?;
+    renderer.weights_of_picture(cloud, camera, settings).give(&mut rows)?;
+    rows.iter_mut().for_each(Row::finish);
+    let sums: ColorSums = rows.into_iter().map(|row| row.found).collect();
     let mut areas = vec![0.0_f32; cloud.len()];
-    for row in &mut rows {
-        row.finish();
-        for (gaussian, sums) in &row.found {
-            let g = *gaussian as usize;
-            areas[g] += sums[0];
-            colors[g].iter_mut().zip(sums).for_each(|(c, s)| *c += s);
-        }
-    }
+    sums.iter().flatten().for_each(|(gaussian, sums)| areas[*gaussian as usize] += sums[0]);
     let axis = camera.world_from_camera * DVec3::Z;
     let focal = camera.focal_px.x * camera.focal_px.y;
     areas.par_iter_mut().enumerate().filter(|(_, a)| **a > 0.0).for_each(|(i, area)| {
         let depth = (cloud.world_position(i) - camera.center).dot(axis);
         *area *= (depth * depth / focal) as f32;
     });
-    Ok(Look {
+    let look = Look {
         strength: strength(&ImagePlanes { width, channels: &channels }),
         ends: ends(&depth, width, 0.5 * (camera.focal_px.x + camera.focal_px.y)),
         camera: camera.clone(),
         areas,
-    })
+    };
+    Ok((look, sums))
 }
 
 /// Collects weights and weighted colors of one row of tiles.
 struct Row<'a> {
-    channels: &'a [Vec<f32>; 3],
+    /// 1 and the color of each pixel.
+    pixels: &'a [[f32; 4]],
     width: usize,
     gaussian: u32,
     sums: [f32; 4],
@@ -144,18 +151,19 @@ impl Row<'_> {
 }
 
 impl ContributionSink<f32> for Row<'_> {
+    #[inline(always)]
     fn add(&mut self, gaussian: u32, x: usize, y: usize, weights: &Lane<f32>) {
         if gaussian != self.gaussian {
             self.finish();
             self.gaussian = gaussian;
         }
-        let first = y * self.width + x;
-        for (k, &weight) in weights.iter().enumerate().take(self.width - x).filter(|(_, w)| **w > 0.0) {
-            self.sums[0] += weight;
-            for (sum, channel) in self.sums[1..].iter_mut().zip(self.channels) {
-                *sum += weight * channel[first + k];
-            }
+        let (first, mut sums) = (y * self.width + x, self.sums);
+        let pixels = &self.pixels[first..(y + 1) * self.width];
+        // Without a branch for zeros, which change no sum.
+        for (weight, pixel) in weights.iter().zip(pixels) {
+            sums.iter_mut().zip(pixel).for_each(|(sum, value)| *sum += weight * value);
         }
+        self.sums = sums;
     }
 }
 

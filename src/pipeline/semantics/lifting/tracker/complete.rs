@@ -1,29 +1,21 @@
-//! Photos as evidence: known labels of a view, rendered into its photo, grow over unknown pixels up to the borders in
-//! the photo or in the shape of the scene.
-//!
-//! Growing is a race of all identities over the pixels. Changes of the photo or the depth cost a pixel time. So does a
-//! color that is not known of the identity, compared with those of all others and of unseen things. The first identity
-//! to arrive keeps the pixel; a pixel that none reaches in time stays unknown.
+//! Photos as evidence: known labels of a view, rendered into its photo, grow over unknown pixels ([`growth`]) up to the
+//! borders in the photo or in the shape of the scene.
 
-use std::cmp::Reverse;
-use std::collections::BinaryHeap;
+use std::time::Instant;
 
 use super::super::error::FindError;
-use super::super::regions::edges::{ImagePlanes, strength};
-use super::super::regions::lab::{lab, planes};
+use super::super::kept_views::{KEPT_BYTES, KeptViews};
 use super::super::regions::shape::ends_of;
+use super::super::removed::RemovedThings;
+use super::super::view_votes::ViewVotes;
 use super::super::votes::UNKNOWN;
-use super::{Tracker, ViewReport, gone};
-use crate::io;
-use crate::math::grid::neighbors;
+use super::growth::{ColorCounts, GrowOptions, GrowthGrid, grow};
+use super::{CarryStage, Tracker, ViewReport, gone, undrawn};
+use crate::io::{self, IoError};
 use crate::pipeline::observer::{Observer, Severity, Ticker};
 use crate::pipeline::semantics::view_map::ViewMap;
-use crate::scene::IdentityId;
-
-/// Lab is divided into cells of this size: lightness, and both color axes.
-const CELL: [f32; 3] = [8.0, 7.0, 7.0];
-/// Cells along each axis.
-const CELLS: [usize; 3] = [13, 36, 36];
+use crate::render::{RenderSettings, Renderer};
+use crate::scene::{GaussianCloud, Identities, IdentityId, Photo};
 
 /// Longer side of the photos, px.
 const SIDE_PX: u32 = 320;
@@ -31,48 +23,101 @@ const SIDE_PX: u32 = 320;
 impl Tracker<'_> {
     /// Completes the labels in the photos, those with most known pixels first; each completed photo helps the next.
     pub(super) fn complete(&mut self, views: &[ViewReport], observer: &mut dyn Observer) -> Result<(), FindError> {
-        let options = GrowOptions::default();
+        let (options, start) = (GrowOptions::default(), Instant::now());
         let mut order: Vec<&ViewReport> = views.iter().filter(|v| v.unknown > 0.0).collect();
         order.sort_by(|a, b| a.unknown.total_cmp(&b.unknown).then(a.photo.cmp(&b.photo)));
         let mut ticker = Ticker::new("Completing identities in the photos", 2 * order.len());
         let mut counts = ColorCounts::new(self.identities.len());
         let mut terrains = Vec::with_capacity(order.len());
-        let of = self.decided();
-        for (i, view) in order.iter().enumerate() {
-            let photo = &self.photos[view.photo];
-            let pixels = match io::photo::load(photo, SIDE_PX) {
-                Ok(pixels) => pixels,
-                Err(e) => {
-                    observer.note(Severity::Warning, format!("Nothing is completed in a photo: {e}"));
-                    continue;
+        let (mut of, photos, mut done) = (self.decided(), self.photos, 0);
+        let kept = KeptViews::new(photos.len(), KEPT_BYTES.saturating_sub(self.small.bytes()));
+        let known = KnownPixels {
+            cloud: self.cloud,
+            settings: self.settings,
+            removed: self.removed.as_ref(),
+            identities: &self.identities,
+            of: &of,
+            options: &options,
+            kept: &kept,
+        };
+        let read = |renderer: &mut Renderer, view: &&ViewReport| known.read(renderer, view.photo, &photos[view.photo]);
+        self.renderers.each(&order, read, |view, read| {
+            match read {
+                Ok((grid, known)) => {
+                    counts.add(&grid, &known);
+                    terrains.push((view.photo, grid));
                 }
-            };
-            let camera = photo.camera.limited_to(SIDE_PX);
-            let ends = ends_of(self.cloud, self.settings, &camera);
-            let grid = GrowthGrid::new(pixels.width_px as usize, &pixels.rgb, ends.as_deref(), &options);
-            let map = self.map_of(view.photo, SIDE_PX, &of)?;
-            let mut known = sure(&map, options.share);
-            gone::forget(&mut known, gone::pixels(self, view.photo, SIDE_PX)?.as_ref());
-            counts.add(&grid, &known);
-            terrains.push((view.photo, grid));
-            ticker.tick(i + 1, observer)?;
-        }
+                Err(e) => observer.note(Severity::Warning, format!("Nothing is completed in a photo: {e}")),
+            }
+            done += 1;
+            Ok(ticker.tick(done, observer)?)
+        })?;
         let colors = counts.compare(options.unseen);
+        self.secs.add(CarryStage::Read, start);
+        let start = Instant::now();
         for (i, (photo, grid)) in terrains.iter().enumerate() {
-            let map = self.map(*photo, SIDE_PX)?;
+            let (place, photo, renderer) = (*photo, &photos[*photo], self.renderers.one());
+            let camera = photo.camera.limited_to(SIDE_PX);
+            let gone = gone::pixels(renderer, self.removed.as_ref(), &camera, self.settings);
+            let gone = gone.map_err(|e| undrawn(photo, e))?;
+            let mut view = kept.weights(place, renderer, self.cloud, &camera, self.settings);
+            let map = ViewMap::of(&mut view, &of, &self.identities).map_err(|e| undrawn(photo, e))?;
             let known = sure(&map, options.share);
             let mut labels = grow(grid, &known, &colors, &options);
             // Known pixels come from earlier votes, so only the grown ones vote.
             labels.iter_mut().zip(&known).filter(|(_, k)| **k != UNKNOWN).for_each(|(l, _)| *l = UNKNOWN);
-            gone::forget(&mut labels, gone::pixels(self, *photo, SIDE_PX)?.as_ref());
-            let photo = &self.photos[*photo];
-            let camera = photo.camera.limited_to(SIDE_PX);
-            self.votes
-                .add_view(&mut self.renderer, self.cloud, &camera, self.settings, &labels)
-                .map_err(|e| FindError::Render(photo.name.clone(), e.into()))?;
+            gone::forget(&mut labels, gone.as_ref());
+            // Without new votes the next photo is labeled like this one.
+            if labels.iter().any(|label| *label != UNKNOWN) {
+                let votes = ViewVotes::of(&mut view, &labels).map_err(|e| undrawn(photo, e))?;
+                self.votes.add(&votes).map_err(|e| undrawn(photo, e))?;
+                of = self.decided();
+            }
             ticker.tick(order.len() + i + 1, observer)?;
         }
+        self.secs.add(CarryStage::Grow, start);
         Ok(())
+    }
+}
+
+/// Scene whose known labels are read into its photos.
+struct KnownPixels<'a> {
+    cloud: &'a GaussianCloud,
+    settings: &'a RenderSettings,
+    removed: Option<&'a RemovedThings>,
+    identities: &'a Identities,
+    /// Identity of each Gaussian.
+    of: &'a [IdentityId],
+    options: &'a GrowOptions,
+    kept: &'a KeptViews,
+}
+
+impl KnownPixels<'_> {
+    /// Returns the terrain of the photo at `place` and its known pixels; an error inside if the photo cannot be read.
+    fn read(
+        &self,
+        renderer: &mut Renderer,
+        place: usize,
+        photo: &Photo,
+    ) -> Result<Result<(GrowthGrid, Vec<IdentityId>), IoError>, FindError> {
+        let pixels = match io::photo::load(photo, SIDE_PX) {
+            Ok(pixels) => pixels,
+            Err(e) => return Ok(Err(e)),
+        };
+        let (cloud, settings, camera) = (self.cloud, self.settings, photo.camera.limited_to(SIDE_PX));
+        let ends = ends_of(renderer, cloud, settings, &camera);
+        let grid = GrowthGrid::new(pixels.width_px as usize, &pixels.rgb, ends.as_deref(), self.options);
+        let view = match ends {
+            Some(_) => renderer.weights_of_picture(cloud, &camera, settings),
+            None => renderer.weights(cloud, &camera, settings),
+        };
+        let mut view = self.kept.watch(view);
+        let map = ViewMap::of(&mut view, self.of, self.identities).map_err(|e| undrawn(photo, e))?;
+        self.kept.offer(place, view);
+        let mut known = sure(&map, self.options.share);
+        let gone = gone::pixels(renderer, self.removed, &camera, settings).map_err(|e| undrawn(photo, e))?;
+        gone::forget(&mut known, gone.as_ref());
+        Ok(Ok((grid, known)))
     }
 }
 
@@ -80,230 +125,4 @@ impl Tracker<'_> {
 fn sure(map: &ViewMap, share: f32) -> Vec<IdentityId> {
     let sure = |i: usize| map.alpha[i] >= 0.5 && map.share[i] >= share;
     (0..map.identity.len()).map(|i| if sure(i) { map.identity[i] } else { UNKNOWN }).collect()
-}
-
-/// Colors and edges of a photo, in px of the view.
-struct GrowthGrid {
-    width: usize,
-    /// Cell of each pixel's color.
-    cell: Vec<u32>,
-    /// Time that a pixel takes for its edges.
-    edge_cost: Vec<f32>,
-}
-
-/// Limits and costs of growing.
-#[derive(Clone, Copy, Debug, PartialEq)]
-struct GrowOptions {
-    /// Time limit of growing.
-    time_limit: f32,
-    /// Time of a pixel without edges in a color of this identity alone.
-    step: f32,
-    /// Time per Lab step of an edge, and for the end of a surface.
-    edge: f32,
-    end: f32,
-    /// Time per nat of evidence of the color against the identity.
-    color: f32,
-    /// Nats from which a color is excluded for the identity.
-    most: f32,
-    /// Least share of a pixel's weight for its identity to be known.
-    share: f32,
-    /// Share of colors of unseen things.
-    unseen: f32,
-}
-
-impl Default for GrowOptions {
-    fn default() -> Self {
-        Self { time_limit: 10.0, step: 0.04, edge: 0.12, end: 12.0, color: 0.25, most: 2.5, share: 0.7, unseen: 0.1 }
-    }
-}
-
-impl GrowthGrid {
-    /// Creates the terrain of sRGB pixels with surface ends, 0 to 1 each.
-    fn new(width: usize, rgb: &[[u8; 3]], ends: Option<&[f32]>, options: &GrowOptions) -> Self {
-        let colors = lab(rgb);
-        let strength = strength(&ImagePlanes { width, channels: &planes(&colors) });
-        let end = |i: usize| ends.map_or(0.0, |e| e[i]);
-        let edge_cost = (0..rgb.len()).map(|i| options.edge * strength[i] + options.end * end(i)).collect();
-        Self { width, cell: colors.iter().map(|c| cell(*c)).collect(), edge_cost }
-    }
-}
-
-fn cell(lab: [f32; 3]) -> u32 {
-    let at = |c: usize, low: f32| (((lab[c] - low) / CELL[c]).max(0.0) as usize).min(CELLS[c] - 1);
-    ((at(0, 0.0) * CELLS[1] + at(1, -126.0)) * CELLS[2] + at(2, -126.0)) as u32
-}
-
-/// Number of pixels of each color cell, by identity, 0 = nobody.
-struct ColorCounts(Vec<Vec<f32>>);
-
-/// Evidence of each color cell against each identity, compared with all others and with unseen things, in nats.
-struct ColorModels(Vec<Vec<f32>>);
-
-impl ColorCounts {
-    fn new(identities: usize) -> Self {
-        Self(vec![vec![0.0; CELLS.iter().product()]; identities + 1])
-    }
-
-    /// Counts the colors of a view by its known labels.
-    fn add(&mut self, grid: &GrowthGrid, known: &[IdentityId]) {
-        for (cell, id) in grid.cell.iter().zip(known) {
-            if let Some(counts) = self.0.get_mut(*id as usize) {
-                counts[*cell as usize] += 1.0;
-            }
-        }
-    }
-
-    /// Compares the counted colors; `unseen` is the share of colors of unseen things.
-    fn compare(self, unseen: f32) -> ColorModels {
-        let shares: Vec<Vec<f32>> = self.0.iter().map(|c| smooth_shares(c)).collect();
-        let cells: usize = CELLS.iter().product();
-        // Unseen things may have any color that things have: about one in thirty cells.
-        let anything = unseen * 30.0 / cells as f32;
-        let all: Vec<f32> = (0..cells).map(|k| anything + shares.iter().map(|s| s[k]).sum::<f32>()).collect();
-        let nats = |s: &f32, all: &f32| -(s / all).max(1e-3).ln();
-        ColorModels(shares.iter().map(|s| s.iter().zip(&all).map(|(s, all)| nats(s, all)).collect()).collect())
-    }
-}
-
-impl ColorModels {
-    fn against(&self, id: IdentityId, cell: u32) -> f32 {
-        self.0.get(id as usize).map_or(0.0, |a| a[cell as usize])
-    }
-}
-
-/// Returns shares that add up to 1, spread to neighboring cells.
-fn smooth_shares(counts: &[f32]) -> Vec<f32> {
-    let strides = [CELLS[1] * CELLS[2], CELLS[2], 1];
-    let mut out = counts.to_vec();
-    for (axis, stride) in strides.into_iter().enumerate() {
-        let from = out.clone();
-        for (k, v) in out.iter_mut().enumerate() {
-            let at = k / stride % CELLS[axis];
-            let side = |ok: bool, j: usize| if ok { from[j] } else { 0.0 };
-            *v = 0.5 * from[k]
-                + 0.25 * side(at > 0, k.wrapping_sub(stride))
-                + 0.25 * side(at + 1 < CELLS[axis], (k + stride).min(from.len() - 1));
-        }
-    }
-    let sum: f32 = out.iter().sum();
-    out.iter_mut().for_each(|v| *v /= sum.max(1.0));
-    out
-}
-
-/// Grows the `known` labels (`UNKNOWN` elsewhere); returns the label of every pixel.
-fn grow(grid: &GrowthGrid, known: &[IdentityId], colors: &ColorModels, options: &GrowOptions) -> Vec<IdentityId> {
-    let n = known.len();
-    let mut label = vec![UNKNOWN; n];
-    let mut time = vec![f32::INFINITY; n];
-    // Non-negative floats order like their bits.
-    let mut open: BinaryHeap<Reverse<(u32, u32, IdentityId)>> = BinaryHeap::new();
-    for i in (0..n).filter(|&i| known[i] != UNKNOWN) {
-        (label[i], time[i]) = (known[i], 0.0);
-        if neighbors(i, grid.width, n).any(|j| known[j] == UNKNOWN) {
-            open.push(Reverse((0, i as u32, known[i])));
-        }
-    }
-    while let Some(Reverse((bits, i, id))) = open.pop() {
-        let (i, now) = (i as usize, f32::from_bits(bits));
-        if now > time[i] || label[i] != id {
-            continue;
-        }
-        for j in neighbors(i, grid.width, n).filter(|&j| known[j] == UNKNOWN) {
-            let against = colors.against(id, grid.cell[j]);
-            let then = now + options.step + grid.edge_cost[j] + options.color * against;
-            if against <= options.most && then < time[j] && then <= options.time_limit {
-                (time[j], label[j]) = (then, id);
-                open.push(Reverse((then.to_bits(), j as u32, id)));
-            }
-        }
-    }
-    label
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::scene::NO_IDENTITY;
-
-    const W: usize = 40;
-    const RED: [u8; 3] = [200, 40, 40];
-    const BLUE: [u8; 3] = [40, 60, 200];
-    const GREEN: [u8; 3] = [40, 190, 60];
-
-    /// Grows the known labels in a picture of columns.
-    fn grown(
-        color: impl Fn(usize) -> [u8; 3],
-        known: impl Fn(usize) -> IdentityId,
-        end: Option<usize>,
-    ) -> Vec<IdentityId> {
-        let options = GrowOptions::default();
-        let rgb: Vec<[u8; 3]> = (0..W * 10).map(|i| color(i % W)).collect();
-        let known: Vec<IdentityId> = (0..W * 10).map(|i| known(i % W)).collect();
-        let ends: Option<Vec<f32>> = end.map(|x| (0..W * 10).map(|i| f32::from(u8::from(i % W == x))).collect());
-        let grid = GrowthGrid::new(W, &rgb, ends.as_deref(), &options);
-        let mut counts = ColorCounts::new(2);
-        counts.add(&grid, &known);
-        let colors = counts.compare(options.unseen);
-        grow(&grid, &known, &colors, &options)[5 * W..6 * W].to_vec()
-    }
-
-    #[test]
-    fn what_is_known_grows_to_where_the_color_changes() {
-        let color = |x: usize| if x < 20 { RED } else { BLUE };
-        let known = |x: usize| {
-            if x < 4 {
-                1
-            } else if x >= 36 {
-                NO_IDENTITY
-            } else {
-                UNKNOWN
-            }
-        };
-        let row = grown(color, known, None);
-        // The border stays open: it belongs to both sides a little.
-        assert!(row[..16].iter().all(|id| *id == 1), "{row:?}");
-        assert!(row[24..].iter().all(|id| *id == NO_IDENTITY), "{row:?}");
-        assert!(row[16..20].iter().all(|id| *id != NO_IDENTITY) && row[20..24].iter().all(|id| *id != 1), "{row:?}");
-    }
-
-    #[test]
-    fn a_color_that_nothing_has_stays_unknown() {
-        let color = |x: usize| {
-            if x < 12 {
-                RED
-            } else if x < 28 {
-                GREEN
-            } else {
-                BLUE
-            }
-        };
-        let known = |x: usize| {
-            if x < 4 {
-                1
-            } else if x >= 36 {
-                2
-            } else {
-                UNKNOWN
-            }
-        };
-        let row = grown(color, known, None);
-        assert!(row[14..26].iter().all(|id| *id == UNKNOWN), "{row:?}");
-        assert!(row[..8].iter().all(|id| *id == 1) && row[32..].iter().all(|id| *id == 2), "{row:?}");
-    }
-
-    #[test]
-    fn the_end_of_a_surface_stops_it_whatever_the_color() {
-        let known = |x: usize| if x < 4 { 1 } else { UNKNOWN };
-        assert_eq!(grown(|_| RED, known, None), [1; W], "the control: nothing ends");
-        let row = grown(|_| RED, known, Some(25));
-        assert!(row[..25].iter().all(|id| *id == 1) && row[26..].iter().all(|id| *id == UNKNOWN), "{row:?}");
-    }
-
-    #[test]
-    fn nothing_known_grows_nothing_and_what_is_known_stays() {
-        assert_eq!(grown(|_| RED, |_| UNKNOWN, None), [UNKNOWN; W]);
-        let known = |x: usize| if x % 2 == 0 { 1 } else { 2 };
-        let row = grown(|_| BLUE, known, None);
-        assert!((0..W).all(|x| row[x] == known(x)));
-    }
 }

@@ -1,25 +1,24 @@
 //! Removed things that the photos still show: their pixels are not used.
 
 use super::super::error::FindError;
+use super::super::removed::RemovedThings;
 use super::super::segmenter::FoundMask;
 use super::super::votes::UNKNOWN;
-use super::Tracker;
-use crate::scene::{IdentityId, Mask};
+use super::{Tracker, undrawn};
+use crate::render::{RenderError, RenderSettings, Renderer};
+use crate::scene::{Camera, IdentityId, Mask};
 
 /// Least share of a mask that must be left without the removed things.
 const LEFT: f64 = 0.5;
 
-/// Returns the pixels of a photo, of at most this size, that show removed things; `None` if nothing was removed.
+/// Returns the pixels of a photo's view that show removed things; `None` if nothing was removed.
 pub(super) fn pixels(
-    tracker: &mut Tracker<'_>,
-    photo: usize,
-    max_side_px: u32,
-) -> Result<Option<Vec<bool>>, FindError> {
-    let Some(removed) = &tracker.removed else { return Ok(None) };
-    let photo = &tracker.photos[photo];
-    let camera = photo.camera.limited_to(max_side_px);
-    let shown = removed.shows(&mut tracker.renderer, &camera, tracker.settings);
-    shown.map(Some).map_err(|e| FindError::Render(photo.name.clone(), e.into()))
+    renderer: &mut Renderer,
+    removed: Option<&RemovedThings>,
+    camera: &Camera,
+    settings: &RenderSettings,
+) -> Result<Option<Vec<bool>>, RenderError> {
+    removed.map(|removed| removed.shows(renderer, camera, settings)).transpose()
 }
 
 /// Returns the masks without the pixels of removed things; and all of those pixels, if there are any.
@@ -28,8 +27,10 @@ pub(super) fn masks_left(
     photo: usize,
     found: Vec<FoundMask>,
 ) -> Result<(Vec<FoundMask>, Option<Vec<bool>>), FindError> {
-    let max_side_px = tracker.options.max_side_px;
-    let mut gone = pixels(tracker, photo, max_side_px)?;
+    let photo = &tracker.photos[photo];
+    let camera = photo.camera.limited_to(tracker.options.max_side_px);
+    let gone = pixels(tracker.renderers.one(), tracker.removed.as_ref(), &camera, tracker.settings);
+    let mut gone = gone.map_err(|e| undrawn(photo, e))?;
     // Earlier versions recorded removed things by name alone.
     let is_gone = |m: &&FoundMask| m.name.as_ref().is_some_and(|name| tracker.options.removed_names.contains(name));
     for mask in found.iter().filter(is_gone) {

@@ -4,30 +4,37 @@
 
 mod complete;
 mod gone;
+mod growth;
 mod options;
+mod tracked;
 mod views;
 
 use std::time::Instant;
 
 pub(crate) use options::TrackOptions;
+pub(crate) use tracked::Tracked;
+use tracked::{CarrySeconds, CarryStage};
 pub(crate) use views::ViewReport;
 
 use super::associate::{Link, conflicts, link};
 use super::error::FindError;
 use super::floaters::drop_floaters;
-use super::mirror::{GUESSED, guess};
+use super::kept_views::{KEPT_BYTES, KeptViews};
+use super::mirror::guess;
 use super::propagate::extend;
 use super::removed::RemovedThings;
+use super::renderers::Renderers;
 use super::sam2_tracker::{LABEL_SIDE_PX, Sam2Tracker};
 use super::segmenter::{FoundMask, Segmenter};
 use super::splat_tree::hierarchy::Hierarchy;
 use super::train_codes::{CODE_SIDE_PX, CodeView};
+use super::view_votes::ViewVotes;
 use super::votes::{Assignment, LEAST_VOTES, UNKNOWN, Votes};
 use crate::math::format::things;
 use crate::pipeline::observer::{Observer, Severity, Ticker, begin};
 use crate::pipeline::semantics::view_map::ViewMap;
-use crate::render::{RenderSettings, Renderer};
-use crate::scene::findings::{ConflictKind, MaskConflict, PhotoFinding, Seen, SegmentationReport};
+use crate::render::{DrawError, RenderSettings, Renderer};
+use crate::scene::findings::ConflictKind;
 use crate::scene::{GaussianCloud, Identities, IdentityId, NO_IDENTITY, Photo};
 
 /// IoU under which a followed mask and that of the Gaussians contradict each other.
@@ -40,54 +47,6 @@ const NEWS: f64 = 0.5;
 
 /// Longer side of the views in which visibility is measured, px.
 const SEE_SIDE_PX: u32 = 256;
-
-#[derive(Clone, Debug, PartialEq)]
-pub(crate) struct Tracked {
-    pub(crate) identities: Identities,
-    pub(crate) assignments: Vec<Assignment>,
-    /// The photos that were segmented, in order.
-    pub(crate) seeds: Vec<usize>,
-    /// Report of every photo, without the identities that hidden Gaussians inherit from those around them.
-    pub(crate) views: Vec<ViewReport>,
-    /// Share of the pixels of each of these photos that no mask speaks for.
-    pub(crate) inferred: Vec<f64>,
-    /// Disagreements of masks with the identities known before, with the photo.
-    pub(crate) conflicts: Vec<(usize, ConflictKind)>,
-    /// The masks of the photos that were segmented and of those to which they were followed.
-    pub(crate) masks: Vec<CodeView>,
-    /// Seconds that each stage took, in order.
-    pub(crate) secs: Vec<(&'static str, f64)>,
-}
-
-impl Tracked {
-    /// Returns the findings about identities and photos, which are kept with the map.
-    pub(crate) fn findings(&self, photos: &[Photo]) -> SegmentationReport {
-        let mut seen = vec![Seen::default(); self.identities.len()];
-        for (k, view) in self.views.iter().enumerate() {
-            for s in &view.seen {
-                seen[s.identity as usize - 1].add(k, s.pixels as u64, s.confidence);
-            }
-        }
-        for guess in self.assignments.iter().filter(|a| a.margin == GUESSED) {
-            let place = (guess.identity as usize).checked_sub(1);
-            place.and_then(|k| seen.get_mut(k)).into_iter().for_each(|seen| seen.guessed += 1);
-        }
-        let place = |photo: usize| self.views.iter().position(|v| v.photo == photo);
-        let conflict = |(photo, what): &(usize, ConflictKind)| {
-            place(*photo).map(|k| MaskConflict { photo: k as u32, what: what.clone() })
-        };
-        let finding = |(v, inferred): (&ViewReport, &f64)| PhotoFinding {
-            name: photos[v.photo].name.clone(),
-            unknown: v.unknown,
-            inferred: *inferred,
-        };
-        SegmentationReport::new(
-            self.views.iter().zip(&self.inferred).map(finding).collect(),
-            seen,
-            self.conflicts.iter().filter_map(conflict).collect(),
-        )
-    }
-}
 
 /// Finds the identities of `cloud` in `photos`. With a `follower`, the first photo's masks are followed to the others
 /// and vote there too.
@@ -111,7 +70,8 @@ pub(crate) fn track(
         photos,
         settings,
         options,
-        renderer: Renderer::new(),
+        renderers: Renderers::new(cloud.len()),
+        small: KeptViews::new(photos.len(), KEPT_BYTES),
         removed: options.removed.as_deref().map(|gone| RemovedThings::new(cloud, gone)),
         identities: options.known.as_ref().map_or_else(Identities::default, |map| map.identities.clone()),
         votes: match &options.known {
@@ -121,6 +81,7 @@ pub(crate) fn track(
         conflicts: Vec::new(),
         masks: Vec::new(),
         segment_secs: 0.0,
+        secs: CarrySeconds::default(),
     };
     let (start, mut follow_secs, mut encode_secs) = (Instant::now(), 0.0, 0.0);
     t.see(observer)?;
@@ -157,13 +118,17 @@ pub(crate) fn track(
     }
     let mut assignments = if options.by_tree {
         begin("Grouping Gaussians", observer)?;
+        let start = Instant::now();
         let cameras: Vec<_> = photos.iter().map(|p| p.camera.clone()).collect();
         let tree = Hierarchy::new(cloud, &cameras, settings, observer)?;
-        tree.label(&said, &t.votes, &t.identities, LEAST_VOTES)
+        let labels = tree.label(&said, &t.votes, &t.identities, LEAST_VOTES);
+        t.secs.add(CarryStage::Group, start);
+        labels
     } else {
         t.votes.decide(&t.identities, LEAST_VOTES)
     };
     let views = t.look(&identities_of(&assignments), observer)?;
+    t.small = KeptViews::new(0, 0);
     if options.by_mirror {
         guess(cloud, &t.identities, &said, &mut assignments, observer)?;
     }
@@ -180,13 +145,9 @@ pub(crate) fn track(
     }
     let told = ConflictKind::summary(&t.conflicts, |i| photos[i].name.clone(), |id| t.identities.full_name(id));
     told.into_iter().for_each(|text| observer.note(Severity::Warning, text));
-    let carry_secs = start.elapsed().as_secs_f64() - t.segment_secs - encode_secs - follow_secs;
-    let secs = vec![
-        ("segment", t.segment_secs),
-        ("encode frames", encode_secs),
-        ("follow masks", follow_secs),
-        ("carry by Gaussians", carry_secs),
-    ];
+    let models = [("segment", t.segment_secs), ("encode frames", encode_secs), ("follow masks", follow_secs)];
+    let rest = start.elapsed().as_secs_f64() - models.iter().map(|m| m.1).sum::<f64>() - t.secs.total();
+    let secs = models.into_iter().chain(t.secs.named()).chain([("carry by Gaussians", rest)]).collect();
     let Tracker { identities, conflicts, masks, .. } = t;
     Ok(Tracked { identities, assignments, seeds, views, inferred, conflicts, masks, secs })
 }
@@ -199,13 +160,16 @@ struct Tracker<'a> {
     photos: &'a [Photo],
     settings: &'a RenderSettings,
     options: &'a TrackOptions,
-    renderer: Renderer,
+    renderers: Renderers,
+    /// Views of [`SEE_SIDE_PX`], which are looked at after every change of labels.
+    small: KeptViews,
     removed: Option<RemovedThings>,
     identities: Identities,
     votes: Votes,
     conflicts: Vec<(usize, ConflictKind)>,
     masks: Vec<CodeView>,
     segment_secs: f64,
+    secs: CarrySeconds,
 }
 
 impl Tracker<'_> {
@@ -216,14 +180,22 @@ impl Tracker<'_> {
 
     /// Measures the visibility of each Gaussian in every photo, before any votes.
     fn see(&mut self, observer: &mut dyn Observer) -> Result<(), FindError> {
-        let mut ticker = Ticker::new("Analyzing photos", self.photos.len());
-        for (i, photo) in self.photos.iter().enumerate() {
-            let camera = photo.camera.limited_to(SEE_SIDE_PX);
-            self.votes
-                .see(&mut self.renderer, self.cloud, &camera, self.settings)
-                .map_err(|e| FindError::Render(photo.name.clone(), e.into()))?;
-            ticker.tick(i + 1, observer)?;
-        }
+        let (start, mut ticker) = (Instant::now(), Ticker::new("Analyzing photos", self.photos.len()));
+        let photos: Vec<usize> = (0..self.photos.len()).collect();
+        let (cloud, settings, all, small) = (self.cloud, self.settings, self.photos, &self.small);
+        let areas = |renderer: &mut Renderer, photo: &usize| {
+            let camera = all[*photo].camera.limited_to(SEE_SIDE_PX);
+            let mut view = small.watch(renderer.weights(cloud, &camera, settings));
+            let areas = ViewVotes::areas_of(&mut view).map_err(|e| undrawn(&all[*photo], e))?;
+            small.offer(*photo, view);
+            Ok(areas)
+        };
+        let votes = &mut self.votes;
+        self.renderers.each(&photos, areas, |photo, areas| {
+            votes.note(&areas);
+            Ok(ticker.tick(photo + 1, observer)?)
+        })?;
+        self.secs.add(CarryStage::See, start);
         Ok(())
     }
 
@@ -279,8 +251,8 @@ impl Tracker<'_> {
         }
         gone::forget(&mut labels, gone.as_ref());
         self.votes
-            .add_view(&mut self.renderer, self.cloud, &camera, self.settings, &labels)
-            .map_err(|e| FindError::Render(self.photos[photo].name.clone(), e.into()))?;
+            .add_view(self.renderers.one(), self.cloud, &camera, self.settings, &labels)
+            .map_err(|e| undrawn(&self.photos[photo], e))?;
         self.keep(photo, (camera.width_px, camera.height_px), &labels);
         Ok(Some((found, ids)))
     }
@@ -325,11 +297,12 @@ impl Tracker<'_> {
                     self.conflicts.push((photo, ConflictKind::Drift(id)));
                 }
             }
-            gone::forget(&mut labels, gone::pixels(self, photo, LABEL_SIDE_PX)?.as_ref());
             let camera = self.photos[photo].camera.limited_to(LABEL_SIDE_PX);
+            let shown = gone::pixels(self.renderers.one(), self.removed.as_ref(), &camera, self.settings);
+            gone::forget(&mut labels, shown.map_err(|e| undrawn(&self.photos[photo], e))?.as_ref());
             self.votes
-                .add_view(&mut self.renderer, self.cloud, &camera, self.settings, &labels)
-                .map_err(|e| FindError::Render(self.photos[photo].name.clone(), e.into()))?;
+                .add_view(self.renderers.one(), self.cloud, &camera, self.settings, &labels)
+                .map_err(|e| undrawn(&self.photos[photo], e))?;
             self.keep(photo, (camera.width_px, camera.height_px), &labels);
         }
         Ok(())
@@ -358,9 +331,14 @@ impl Tracker<'_> {
     fn map_of(&mut self, photo: usize, max_side_px: u32, of: &[IdentityId]) -> Result<ViewMap, FindError> {
         let photo = &self.photos[photo];
         let camera = photo.camera.limited_to(max_side_px);
-        ViewMap::render(&mut self.renderer, self.cloud, of, &self.identities, &camera, self.settings)
-            .map_err(|e| FindError::Render(photo.name.clone(), e))
+        ViewMap::of(&mut self.renderers.one().weights(self.cloud, &camera, self.settings), of, &self.identities)
+            .map_err(|e| undrawn(photo, e))
     }
+}
+
+/// Error of a photo's view that could not be drawn.
+fn undrawn(photo: &Photo, e: impl Into<DrawError>) -> FindError {
+    FindError::Render(photo.name.clone(), e.into())
 }
 
 fn identities_of(assignments: &[Assignment]) -> Vec<IdentityId> {

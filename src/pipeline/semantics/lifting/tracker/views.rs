@@ -1,10 +1,13 @@
 //! Identities seen in each photo, and its share of unknown pixels.
 
+use std::time::Instant;
+
 use super::super::error::FindError;
 use super::super::segmenter::Segmenter;
-use super::Tracker;
+use super::{CarryStage, SEE_SIDE_PX, Tracker, undrawn};
 use crate::pipeline::observer::{Observer, Ticker};
 use crate::pipeline::semantics::view_map::ViewMap;
+use crate::render::Renderer;
 use crate::scene::IdentityId;
 
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
@@ -34,12 +37,36 @@ impl Tracker<'_> {
     ) -> Result<Vec<ViewReport>, FindError> {
         let mut ticker = Ticker::new("Checking labels", self.photos.len());
         observer.proceed()?;
-        let mut views = Vec::with_capacity(self.photos.len());
-        for photo in 0..self.photos.len() {
-            views.push(self.look_at(photo, of)?);
-            ticker.tick(photo + 1, observer)?;
-        }
+        let photos: Vec<usize> = (0..self.photos.len()).collect();
+        let mut views = Vec::with_capacity(photos.len());
+        self.look_at(&photos, of, |view| {
+            views.push(view);
+            Ok(ticker.tick(views.len(), observer)?)
+        })?;
         Ok(views)
+    }
+
+    /// Looks at some of the photos, and hands on their reports in this order.
+    fn look_at(
+        &mut self,
+        photos: &[usize],
+        of: &[IdentityId],
+        mut then: impl FnMut(ViewReport) -> Result<(), FindError>,
+    ) -> Result<(), FindError> {
+        let start = Instant::now();
+        let (cloud, settings, all) = (self.cloud, self.settings, self.photos);
+        let (small, identities) = (&self.small, &self.identities);
+        // A small picture suffices to measure the unknown share.
+        let side_px = self.options.max_side_px.min(SEE_SIDE_PX);
+        let look = |renderer: &mut Renderer, photo: &usize| {
+            let camera = all[*photo].camera.limited_to(side_px);
+            let mut view = small.weights(*photo, renderer, cloud, &camera, settings);
+            let map = ViewMap::of(&mut view, of, identities).map_err(|e| undrawn(&all[*photo], e))?;
+            Ok(report(*photo, &map, identities.len()))
+        };
+        self.renderers.each(photos, look, |_, view| then(view))?;
+        self.secs.add(CarryStage::Look, start);
+        Ok(())
     }
 
     /// Segments the photos with user-given names that are not found yet. If another photo marks such a thing as
@@ -67,12 +94,6 @@ impl Tracker<'_> {
         Ok(())
     }
 
-    fn look_at(&mut self, photo: usize, of: &[IdentityId]) -> Result<ViewReport, FindError> {
-        // A small picture suffices to measure the unknown share.
-        let map = self.map_of(photo, self.options.max_side_px.min(256), of)?;
-        Ok(report(photo, &map, self.identities.len()))
-    }
-
     /// Returns the photo with most unknown pixels among the open views. Masks make pixels known, hardly ever unknown.
     /// So a view that was better known before than another one is now need not be rendered again.
     pub(super) fn most_unknown(
@@ -91,7 +112,10 @@ impl Tracker<'_> {
             if fresh[i] {
                 return Ok(Some(views[i].photo));
             }
-            views[i] = self.look_at(views[i].photo, &of)?;
+            self.look_at(&[views[i].photo], &of, |view| {
+                views[i] = view;
+                Ok(())
+            })?;
             fresh[i] = true;
             ticker.tick(looked + 1, observer)?;
         }
