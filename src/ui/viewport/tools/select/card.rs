@@ -6,6 +6,7 @@ use strum::VariantArray;
 use super::super::ToolScene;
 use super::super::card::ToolCard;
 use super::SelectTool;
+use super::tip::{RADII_PT, WIDTHS_PX};
 use crate::jobs::select::{SelectFor, SelectStep};
 use crate::math::format;
 use crate::scene::{Identities, Level, NO_IDENTITY};
@@ -107,14 +108,21 @@ fn options(tool: &mut SelectTool, ui: &mut Ui) {
         ui.selectable_value(&mut tool.takes_away, false, "+ add");
         ui.selectable_value(&mut tool.takes_away, true, "\u{2212} remove");
         let slider = match tool.shape {
-            SelectShape::Click => Some(("Width", Slider::new(&mut tool.line_pt, 2.0..=30.0))),
-            SelectShape::Brush | SelectShape::Sphere => Some(("Radius", Slider::new(&mut tool.brush_pt, 2.0..=120.0))),
+            SelectShape::Click => {
+                let width = Slider::new(&mut tool.tip.line_width_px, WIDTHS_PX).logarithmic(true).integer();
+                Some(("Width", width.suffix(" px")))
+            }
+            SelectShape::Brush | SelectShape::Sphere => Some(("Radius", Slider::new(&mut tool.tip.brush_pt, RADII_PT))),
             SelectShape::Color => Some(("Tolerance", Slider::new(&mut tool.tolerance, 0.01..=0.6))),
             SelectShape::Object | SelectShape::Lasso | SelectShape::Rectangle => None,
         };
         if let Some((name, slider)) = slider {
             ui.label(name);
-            ui.add(slider.show_value(false)).accessible_name(name);
+            let slider = ui.add(slider.show_value(tool.shape == SelectShape::Click)).accessible_name(name);
+            let keys = [Action::NarrowLine, Action::WidenLine].map(|action| keys::label(ui.ctx(), &action));
+            if tool.shape != SelectShape::Color {
+                slider.on_hover_text(format!("Also by the keys {} and {}.", keys[0], keys[1]));
+            }
         }
         if tool.shape.is_area() {
             ui.checkbox(&mut tool.through, "Through").on_hover_text("Take what lies behind the surface, too.");
