@@ -7,6 +7,7 @@ use super::super::ToolScene;
 use super::super::card::ToolCard;
 use super::SelectTool;
 use super::tip::{RADII_PT, WIDTHS_PX};
+use super::told::ToldEffect;
 use crate::jobs::select::{SelectFor, SelectStep};
 use crate::math::format;
 use crate::scene::{Identities, Level, NO_IDENTITY};
@@ -160,17 +161,18 @@ fn changes(tool: &mut SelectTool, ui: &mut Ui, scene: &ToolScene<'_>) {
     });
 }
 
-/// Draws the state of the selection, and what it takes from a known object, in one row: nothing moves as they change.
+/// Draws the state of the selection, and what it does to other things, in one row: nothing moves as they change.
 fn status(tool: &SelectTool, ui: &mut Ui, scene: &ToolScene<'_>, cx: &Ctx<'_>) {
     count(tool, ui, scene, cx);
     let all = cx.state.semantics.as_ref().map(|map| &map.identities);
-    if let Some((all, taken)) = all.zip(tool.taken_object()) {
-        let text = taken.text(&cx.state.labels.full_name(all, taken.from));
-        // What is cut is told on hover.
-        ui.add(Label::new(RichText::new(text).color(theme::warning())).truncate());
-    } else if tool.selected.as_ref().is_some_and(|s| s.is_limited) {
-        let text = "Only near the click";
-        ui.weak(text).on_hover_text("The click could have changed much more of what is known. A line changes more.");
+    let name = |id| all.map_or_else(String::new, |all| cx.state.labels.full_name(all, id));
+    // What is cut is told on hover.
+    let mut tell = |text: String, color| ui.add(Label::new(RichText::new(text).color(color)).truncate());
+    if let Some(taken) = tool.taken_object() {
+        tell(taken.text(&name(taken.from)), theme::warning());
+    } else if let Some(told) = tool.selected.as_ref().and_then(|s| ToldEffect::new(&s.effect, &name)) {
+        let color = if told.is_warning { theme::warning() } else { theme::weak() };
+        tell(told.line, color).on_hover_text(told.all);
     }
 }
 

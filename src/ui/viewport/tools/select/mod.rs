@@ -6,6 +6,7 @@ mod line;
 mod reach;
 mod taken;
 mod tip;
+mod told;
 
 use std::collections::VecDeque;
 use std::sync::Arc;
