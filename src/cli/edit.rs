@@ -9,7 +9,7 @@ use super::progress::Console;
 use super::scene_args::open_scene;
 use super::{CliError, output};
 use crate::jobs::rearrange::{self, Arrangement, Grade, Placement, SplatEdit};
-use crate::jobs::{JobError, derived, query};
+use crate::jobs::{derived, query};
 use crate::math::{format, srgb};
 use crate::scene::LevelFilter;
 
@@ -87,15 +87,7 @@ pub(crate) fn run(args: EditArgs, quiet: bool) -> Result<(), CliError> {
     let scene = open_scene(&args.scene)?;
     let map = scene.semantics()?;
     derived::check_place(&scene, &args.out)?;
-    let ids = query::named(&map, &query::seen_from(&scene, None), &args.text, args.kind, 1)?;
-    let id = match ids.as_slice() {
-        [id] => *id,
-        [] => return Err(JobError::NoMatch(args.text).into()),
-        several => {
-            let names: Vec<String> = several.iter().map(|id| map.identities.full_name(*id)).collect();
-            return Err(JobError::SeveralFit { text: args.text, names: names.join("', '") }.into());
-        }
-    };
+    let id = query::one_named(&map, &query::seen_from(&scene, None), &args.text, args.kind)?;
     let axis = args.axis.unwrap_or_else(|| scene.home().up);
     let to = Placement {
         shift: args.shift.unwrap_or_default(),

@@ -224,6 +224,26 @@ pub(crate) fn named(
     }
 }
 
+/// Returns the one identity that a text names.
+///
+/// # Errors
+/// If nothing is found, or only by embedding, or if several fit.
+pub(crate) fn one_named(
+    map: &SemanticMap,
+    place: &QueryPlace,
+    text: &str,
+    level: LevelFilter,
+) -> Result<IdentityId, JobError> {
+    match named(map, place, text, level, 1)?.as_slice() {
+        [id] => Ok(*id),
+        [] => Err(JobError::NoMatch(text.to_owned())),
+        several => {
+            let names: Vec<String> = several.iter().map(|id| map.identities.full_name(*id)).collect();
+            Err(JobError::SeveralFit { text: text.to_owned(), names: names.join("', '") })
+        }
+    }
+}
+
 /// Returns the answer to a query.
 ///
 /// # Errors

@@ -7,12 +7,16 @@ use glam::DMat3;
 
 use super::{JobError, export};
 use crate::io::{atomic, files};
+use crate::math::format::capital;
 use crate::pipeline::cleaning::neighbors::SplatNeighbors;
 use crate::pipeline::observer::{Observer, Severity};
 use crate::pipeline::semantics::lifting::edit::{self, Edit};
-use crate::pipeline::semantics::lifting::splat_tree::hierarchy::{CorrectedSplats, Hierarchy};
+use crate::pipeline::semantics::lifting::splat_tree::hierarchy::Hierarchy;
 pub use crate::pipeline::semantics::lifting::splat_tree::marks::Stroke;
 use crate::pipeline::semantics::lifting::splat_tree::marks::StrokeMarks;
+use crate::pipeline::semantics::lifting::splat_tree::others::OtherIdentities;
+pub(crate) use crate::pipeline::semantics::lifting::splat_tree::selection::MarkEffect;
+use crate::pipeline::semantics::lifting::splat_tree::selection::MarkedSplats;
 use crate::pipeline::semantics::lifting::splat_tree::stored;
 use crate::render::{RenderSettings, Renderer};
 use crate::scene::{Camera, GaussianCloud, HomeView, Identities, IdentityId, NO_IDENTITY, SemanticMap};
@@ -109,8 +113,8 @@ pub struct Selected {
     neighbors: Option<Arc<SplatNeighbors>>,
     /// Indices of the selected Gaussians, ascending.
     pub(crate) gaussians: Vec<u32>,
-    /// True if the last click on something known was kept from changing more.
-    pub(crate) is_limited: bool,
+    /// Effect of the last stroke beside the selection itself; nothing after another step.
+    pub(crate) effect: MarkEffect,
     /// Objects and parts with the selection, and its identity among them; `NO_IDENTITY` if nothing is selected.
     pub(crate) preview: Arc<SemanticMap>,
     pub(crate) id: IdentityId,
@@ -159,12 +163,16 @@ pub(crate) fn run(request: &SelectRequest, observer: &mut dyn Observer) -> Resul
         None => (Marked { from: Arc::new(extent(map, purpose, cloud)), ..Marked::default() }, Vec::new(), None),
     };
     let hierarchy = prepared.as_ref().filter(|p| p.is_of(cloud)).map(|p| &*p.hierarchy);
-    let corrected = |now: &Marked| match (hierarchy.filter(|_| now.marks.len() > 0), purpose) {
-        (Some(hierarchy), SelectFor::Extent(_)) => hierarchy.correct(&now.marks, &now.from),
-        (Some(hierarchy), SelectFor::New(_)) => CorrectedSplats::new(hierarchy.select(&now.marks, &now.from)),
-        (None, _) => CorrectedSplats::new(mask(cloud.len(), &now.from)),
+    let others = match purpose {
+        SelectFor::Extent(id) => OtherIdentities::new(map, *id),
+        SelectFor::New(_) => OtherIdentities::default(),
     };
-    let selected = |now: &Marked| corrected(now).is_in;
+    let marked = |now: &Marked| match (hierarchy.filter(|_| now.marks.len() > 0), purpose) {
+        (Some(hierarchy), SelectFor::Extent(_)) => hierarchy.correct(&now.marks, &now.from, &others),
+        (Some(hierarchy), SelectFor::New(_)) => hierarchy.select(&now.marks, &now.from),
+        (None, _) => MarkedSplats { is_in: mask(cloud.len(), &now.from), ..MarkedSplats::default() },
+    };
+    let selected = |now: &Marked| marked(now).is_in;
     let change = match step {
         SelectStep::Stroke(stroke) => {
             now.marks.add(&mut Renderer::new(), cloud, settings, stroke)?;
@@ -198,7 +206,11 @@ pub(crate) fn run(request: &SelectRequest, observer: &mut dyn Observer) -> Resul
         earlier.push(now);
         now = Marked { from: Arc::new((0..of.len()).filter(|i| of[*i]).collect()), ..Marked::default() };
     }
-    let CorrectedSplats { is_in: of, is_limited } = corrected(&now);
+    let MarkedSplats { is_in: of, effect } = marked(&now);
+    if matches!(step, SelectStep::Stroke(_)) {
+        let told = effect.sentences(&|id| map.identities.full_name(id));
+        told.into_iter().flatten().for_each(|text| observer.note(Severity::Info, capital(&text)));
+    }
     let gaussians: Vec<u32> = (0..cloud.len() as u32).filter(|i| of[*i as usize]).collect();
     let (preview, id) = if gaussians.is_empty() {
         (Arc::clone(map), NO_IDENTITY)
@@ -210,7 +222,7 @@ pub(crate) fn run(request: &SelectRequest, observer: &mut dyn Observer) -> Resul
         };
         (Arc::new(preview), id)
     };
-    Ok(Selected { now, earlier, of: cloud.len(), neighbors, gaussians, is_limited, preview, id })
+    Ok(Selected { now, earlier, of: cloud.len(), neighbors, gaussians, effect, preview, id })
 }
 
 /// Returns the Gaussians with which a selection begins, indices.

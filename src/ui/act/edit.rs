@@ -31,6 +31,13 @@ pub(in crate::ui) fn segment(app: &mut App, of: Option<IdentityId>) {
     app.viewport.select(of.map(SelectFor::New), &app.state);
 }
 
+/// Makes the lines of the selection tool, or its brush and ball, wider or narrower.
+pub(in crate::ui) fn widen_line(app: &mut App, is_wider: bool) {
+    if !app.viewport.widen_line(is_wider) {
+        app.state.toast(Tone::Info, "Nothing is being selected: a new object or a correction has lines.");
+    }
+}
+
 /// Begins correcting the extent of an identity.
 pub(in crate::ui) fn correct(app: &mut App, id: IdentityId) {
     app.viewport.select(Some(SelectFor::Extent(id)), &app.state);

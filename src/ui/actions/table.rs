@@ -151,6 +151,10 @@ macro_rules! action_table {
             SelectBy(shape: SelectShape): format!("Select Gaussians by {shape}"),
                 "In any view; to keep them as an object or part, to delete or to export them."
                 => app.viewport.select_with(shape, &app.state);
+            NarrowLine: "Narrower line", "Make the lines of the selection tool thinner, or its brush and ball smaller.", "-"
+                => edit::widen_line(app, false);
+            WidenLine: "Wider line", "Make the lines of the selection tool thicker, or its brush and ball larger.", "="
+                => edit::widen_line(app, true);
             RefineChosen: "Go on selecting by hand", "Brush, lasso and more, from the selection of the Clean pane on."
                 => edit::refine_chosen(app);
             DeleteChosen: "Delete the selected Gaussians",

@@ -362,6 +362,18 @@ impl Viewport {
         self.select_tool().map_or(0, SelectTool::lines_drawn)
     }
 
+    /// Width of the lines of the selection tool, px of the view in the window.
+    pub fn line_width_px(&self) -> Option<f32> {
+        self.select_tool().map(|tool| tool.tip.line_width_px)
+    }
+
+    /// Makes the lines of the selection tool wider or narrower. Returns false if it is not in use.
+    pub(crate) fn widen_line(&mut self, is_wider: bool) -> bool {
+        let Some(Tool::Select(tool)) = &mut self.tool else { return false };
+        tool.tip.step(tool.shape, is_wider);
+        true
+    }
+
     pub(super) fn select_tool(&self) -> Option<&SelectTool> {
         match &self.tool {
             Some(Tool::Select(tool)) => Some(tool),

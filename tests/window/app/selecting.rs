@@ -319,3 +319,27 @@ fn another_tool_does_not_drop_a_selection_or_a_change_unasked() {
     let objects = w.app().state.semantics.as_ref().map(|m| m.identities.len());
     assert_eq!(objects, Some(4), "nothing was copied");
 }
+
+#[test]
+fn keys_make_lines_thinner_and_wider_while_something_is_selected() {
+    let folder = tempfile::tempdir().expect("folder");
+    let mut w = asked(folder.path());
+    let box_1 = middle_of(&w, 2);
+    // The control: without the tool, the keys do nothing.
+    w.press(Key::Equals);
+    assert_eq!(w.app().viewport.line_width_px(), None);
+    for (key, width) in [(Key::Minus, 1.0), (Key::Equals, 64.0)] {
+        w.ask(Action::SegmentNew(Some(0)));
+        w.until("a picture for it", |a| a.viewport.picture().is_some_and(|p| p.full));
+        assert_eq!(w.app().viewport.line_width_px(), Some(10.0));
+        let eye = w.app().viewport.pose();
+        for _ in 0..20 {
+            w.press(key);
+        }
+        w.harness.run_steps(2);
+        assert_eq!((w.app().viewport.line_width_px(), w.app().viewport.pose()), (Some(width), eye));
+        click(&mut w, box_1, Modifiers::NONE);
+        w.until("an answer", |a| a.viewport.selection().is_some_and(|n| n > 0));
+        w.ask(Action::SegmentNew(None));
+    }
+}

@@ -8,6 +8,7 @@ use super::Category;
 use crate::math::grid::{neighbors, regions};
 use crate::pipeline::semantics::lifting::splat_tree::hierarchy::Hierarchy;
 use crate::pipeline::semantics::lifting::splat_tree::marks::{Stroke, StrokeMarks};
+use crate::pipeline::semantics::lifting::splat_tree::others::OtherIdentities;
 use crate::pipeline::semantics::query::timing::ms_since;
 use crate::pipeline::semantics::view_map::ViewMap;
 use crate::render::{DrawError, RenderSettings, Renderer};
@@ -99,8 +100,8 @@ pub(crate) fn rows(
             let stroke = Stroke { camera: views[view].camera.clone(), pixels, is_plus };
             marks.add(&mut Renderer::new(), cloud, settings, &stroke)?;
             selected = match known {
-                Some(_) => hierarchy.correct(&marks, &from).is_in,
-                None => hierarchy.select(&marks, &from),
+                Some(_) => hierarchy.correct(&marks, &from, &OtherIdentities::default()).is_in,
+                None => hierarchy.select(&marks, &from).is_in,
             };
             row.ms[k] = ms_since(start);
         }

@@ -8,6 +8,9 @@ use crate::math::lanes::Lane;
 use crate::render::{ContributionSink, RenderError, RenderSettings, Renderer, TILE_PX};
 use crate::scene::{Camera, GaussianCloud, Mask};
 
+/// Longer side of the view in which strokes are drawn, px.
+const SIDE_PX: u32 = 512;
+
 /// Least size of a stroke's target, as a multiple of the stroke's own area.
 const CLICK: f64 = 16.0;
 
@@ -27,6 +30,15 @@ pub struct Stroke {
     pub(crate) pixels: Mask,
     /// True if the pixels belong to the target.
     pub(crate) is_plus: bool,
+}
+
+impl Stroke {
+    /// The view in which a stroke is drawn whose radius is `radius_px` in the view of a camera: a small one, but not so
+    /// small that the stroke would have less than two pixels.
+    pub(crate) fn view(camera: &Camera, radius_px: f32) -> Camera {
+        let longer = camera.width_px.max(camera.height_px) as f32;
+        camera.limited_to(SIDE_PX.max((longer / radius_px).ceil() as u32))
+    }
 }
 
 /// Marks of a selection.
@@ -147,5 +159,20 @@ impl ContributionSink<f32> for Row<'_> {
                 self.found.push((pixel as u32, gaussian, weight));
             }
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::hierarchy::tests::cameras;
+    use super::*;
+
+    #[test]
+    fn a_thin_stroke_is_drawn_in_a_larger_view_and_no_other() {
+        let camera = cameras()[0].resized(2000, 1500);
+        let side = |radius_px: f32| Stroke::view(&camera, radius_px).width_px;
+        assert_eq!([5.0, 4.0, 32.0].map(side), [512; 3], "the usual width, and wider ones");
+        assert_eq!([2.0, 1.0, 0.5].map(side), [1000, 2000, 2000], "as large as it is at most");
+        assert_eq!(Stroke::view(&cameras()[0], 0.5), cameras()[0]);
     }
 }

@@ -6,6 +6,8 @@ use strum::VariantArray;
 use super::super::ToolScene;
 use super::super::card::ToolCard;
 use super::SelectTool;
+use super::tip::{RADII_PT, WIDTHS_PX};
+use super::told::ToldEffect;
 use crate::jobs::select::{SelectFor, SelectStep};
 use crate::math::format;
 use crate::scene::{Identities, Level, NO_IDENTITY};
@@ -107,14 +109,21 @@ fn options(tool: &mut SelectTool, ui: &mut Ui) {
         ui.selectable_value(&mut tool.takes_away, false, "+ add");
         ui.selectable_value(&mut tool.takes_away, true, "\u{2212} remove");
         let slider = match tool.shape {
-            SelectShape::Click => Some(("Width", Slider::new(&mut tool.line_pt, 2.0..=30.0))),
-            SelectShape::Brush | SelectShape::Sphere => Some(("Radius", Slider::new(&mut tool.brush_pt, 2.0..=120.0))),
+            SelectShape::Click => {
+                let width = Slider::new(&mut tool.tip.line_width_px, WIDTHS_PX).logarithmic(true).integer();
+                Some(("Width", width.suffix(" px")))
+            }
+            SelectShape::Brush | SelectShape::Sphere => Some(("Radius", Slider::new(&mut tool.tip.brush_pt, RADII_PT))),
             SelectShape::Color => Some(("Tolerance", Slider::new(&mut tool.tolerance, 0.01..=0.6))),
             SelectShape::Object | SelectShape::Lasso | SelectShape::Rectangle => None,
         };
         if let Some((name, slider)) = slider {
             ui.label(name);
-            ui.add(slider.show_value(false)).accessible_name(name);
+            let slider = ui.add(slider.show_value(tool.shape == SelectShape::Click)).accessible_name(name);
+            let keys = [Action::NarrowLine, Action::WidenLine].map(|action| keys::label(ui.ctx(), &action));
+            if tool.shape != SelectShape::Color {
+                slider.on_hover_text(format!("Also by the keys {} and {}.", keys[0], keys[1]));
+            }
         }
         if tool.shape.is_area() {
             ui.checkbox(&mut tool.through, "Through").on_hover_text("Take what lies behind the surface, too.");
@@ -152,17 +161,18 @@ fn changes(tool: &mut SelectTool, ui: &mut Ui, scene: &ToolScene<'_>) {
     });
 }
 
-/// Draws the state of the selection, and what it takes from a known object, in one row: nothing moves as they change.
+/// Draws the state of the selection, and what it does to other things, in one row: nothing moves as they change.
 fn status(tool: &SelectTool, ui: &mut Ui, scene: &ToolScene<'_>, cx: &Ctx<'_>) {
     count(tool, ui, scene, cx);
     let all = cx.state.semantics.as_ref().map(|map| &map.identities);
-    if let Some((all, taken)) = all.zip(tool.taken_object()) {
-        let text = taken.text(&cx.state.labels.full_name(all, taken.from));
-        // What is cut is told on hover.
-        ui.add(Label::new(RichText::new(text).color(theme::warning())).truncate());
-    } else if tool.selected.as_ref().is_some_and(|s| s.is_limited) {
-        let text = "Only near the click";
-        ui.weak(text).on_hover_text("The click could have changed much more of what is known. A line changes more.");
+    let name = |id| all.map_or_else(String::new, |all| cx.state.labels.full_name(all, id));
+    // What is cut is told on hover.
+    let mut tell = |text: String, color| ui.add(Label::new(RichText::new(text).color(color)).truncate());
+    if let Some(taken) = tool.taken_object() {
+        tell(taken.text(&name(taken.from)), theme::warning());
+    } else if let Some(told) = tool.selected.as_ref().and_then(|s| ToldEffect::new(&s.effect, &name)) {
+        let color = if told.is_warning { theme::warning() } else { theme::weak() };
+        tell(told.line, color).on_hover_text(told.all);
     }
 }
 

@@ -33,9 +33,14 @@ impl DrawnLine {
                 })
             }
             _ => {
-                let radius = (self.radius_pt * scale).max(1.0);
+                // One pixel at least, wherever its center is.
+                let radius = (self.radius_pt * scale).max(std::f32::consts::FRAC_1_SQRT_2);
                 let pairs: Vec<&[Vec2]> = if at.len() > 1 { at.windows(2).collect() } else { vec![&at] };
-                Mask::from_fn(w, h, |i| pairs.iter().any(|pair| !pair.is_empty() && is_near(pair, pixel(i), radius)))
+                let all = Rect::from_points(&at.iter().map(|p| p.to_pos2()).collect::<Vec<_>>()).expand(radius + 1.0);
+                Mask::from_fn(w, h, |i| {
+                    let p = pixel(i);
+                    all.contains(p.to_pos2()) && pairs.iter().any(|pair| !pair.is_empty() && is_near(pair, p, radius))
+                })
             }
         }
     }
@@ -122,6 +127,26 @@ mod tests {
             0
         );
         assert!(area(SelectShape::Brush, &corners[..1]).area() > 4);
-        assert_eq!(area(SelectShape::Lasso, &[]).area(), 0);
+        assert_eq!(area(SelectShape::Lasso, &[]).area() + area(SelectShape::Brush, &[]).area(), 0);
+    }
+
+    #[test]
+    fn a_line_has_its_width_and_no_gaps() {
+        let camera = Camera::look_at(DVec3::new(0.0, -4.0, 0.0), DVec3::ZERO, DVec3::Z, 0.8, 100, 50).expect("valid");
+        let shown = Rect::from_min_size(pos2(10.0, 20.0), vec2(100.0, 50.0));
+        let line = |width_px: f32, ends: [(f32, f32); 2]| {
+            let at = ends.map(|(x, y)| pos2(10.0 + x, 20.0 + y)).to_vec();
+            let line = DrawnLine { shape: SelectShape::Click, at, takes_away: false, radius_pt: 0.5 * width_px };
+            line.pixels(shown, &camera)
+        };
+        let level = [(20.0, 25.5), (80.0, 25.5)];
+        let rows = |mask: &Mask| (0..50).filter(|y| mask.contains(y * 100 + 50)).count();
+        assert_eq!([1.0, 3.0, 9.0, 21.0].map(|width| rows(&line(width, level))), [1, 3, 9, 21]);
+        // The thinnest one goes through every column, whatever its slope, and a click has a pixel wherever it is.
+        let slanted = line(1.0, [(20.3, 10.9), (80.7, 33.2)]);
+        assert!((21..80).all(|x| (0..50).any(|y| slanted.contains(y * 100 + x))));
+        for at in [(30.0, 30.0), (30.5, 30.5), (30.99, 30.01)] {
+            assert!((1..5).contains(&line(1.0, [at, at]).area()), "{at:?}");
+        }
     }
 }

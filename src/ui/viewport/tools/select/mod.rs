@@ -5,15 +5,18 @@ mod card;
 mod line;
 mod reach;
 mod taken;
+mod tip;
+mod told;
 
 use std::collections::VecDeque;
 use std::sync::Arc;
 
-use egui::{Color32, PointerButton, Response, Stroke as Line, Ui};
+use egui::{Color32, PointerButton, Response, Ui};
 use glam::DVec2;
 
 use self::line::DrawnLine;
 use self::taken::TakenObject;
+use self::tip::SelectTip;
 use super::super::outline;
 use super::super::picking::{DrawnOutline, innermost};
 use super::super::splat_selection::SplatSelection;
@@ -32,8 +35,6 @@ use crate::worker::{JobInfo, Task, Tasks, Versioned};
 /// Title of the jobs.
 const TITLE: &str = "Selecting";
 
-/// Longer side of the view in which lines are rasterized, px.
-const SIDE_PX: u32 = 512;
 /// Most balls along a drag.
 const MOST_BALLS: usize = 60;
 
@@ -47,9 +48,7 @@ pub(crate) struct SelectTool {
     purpose: SelectFor,
     pub(crate) shape: SelectShape,
     name: String,
-    /// Radius of lines, of the brush and of the ball, points.
-    line_pt: f32,
-    brush_pt: f32,
+    pub(crate) tip: SelectTip,
     /// Largest distance of a color in red, green and blue, 0 to 1 each.
     tolerance: f32,
     /// True if Gaussians behind the surface are taken, too.
@@ -88,8 +87,7 @@ impl SelectTool {
             purpose,
             shape,
             name: String::new(),
-            line_pt: 5.0,
-            brush_pt: 18.0,
+            tip: SelectTip::default(),
             tolerance: 0.12,
             through: false,
             marks: has_first,
@@ -235,10 +233,6 @@ impl SelectTool {
         self.drawn_lines.len()
     }
 
-    fn radius_pt(&self) -> f32 {
-        if self.shape == SelectShape::Click { self.line_pt } else { self.brush_pt }
-    }
-
     /// Turns a finished line into a step. Returns false if the frame is not complete yet.
     fn finish(&mut self, area: ViewArea, scene: &ToolScene<'_>, cx: &mut Ctx<'_>, with_alt: bool) -> bool {
         let Some((line, camera)) = &self.line else { return true };
@@ -349,7 +343,9 @@ impl ViewTool for SelectTool {
         {
             let at = response.ctx.input(|i| i.pointer.press_origin()).unwrap_or(pos);
             // The camera of the visible frame, though a newer frame may be on its way.
-            let (camera, radius_pt) = (picture.camera.limited_to(SIDE_PX), self.radius_pt());
+            let radius_pt = self.tip.radius_pt(self.shape);
+            let radius_px = radius_pt * picture.camera.width_px as f32 / area.shown.width().max(1.0);
+            let camera = Stroke::view(&picture.camera, radius_px);
             let takes_away = self.takes_away != modifiers.shift;
             self.line = Some((DrawnLine { shape: self.shape, at: vec![at], takes_away, radius_pt }, camera));
         }
@@ -386,12 +382,8 @@ impl ViewTool for SelectTool {
             }
         }
         self.drawn_lines.iter().chain(self.line.iter().map(|(line, _)| line)).for_each(|line| line.paint(ui, shown));
-        let has_tip = matches!(self.shape, SelectShape::Click | SelectShape::Brush | SelectShape::Sphere);
-        if let Some(pos) = ui.input(|i| i.pointer.hover_pos()).filter(|pos| has_tip && shown.contains(*pos)) {
-            let takes_away = self.takes_away != ui.input(|i| i.modifiers.shift);
-            let color = if takes_away { MINUS } else { PLUS };
-            ui.painter_at(shown).circle_stroke(pos, self.radius_pt(), Line::new(1.5, color));
-        }
+        let takes_away = self.takes_away != ui.input(|i| i.modifiers.shift);
+        self.tip.paint(ui, shown, self.shape, if takes_away { MINUS } else { PLUS });
     }
 
     fn card(&mut self, ui: &Ui, places: CardPlaces, scene: &mut ToolScene<'_>, cx: &mut Ctx<'_>) {

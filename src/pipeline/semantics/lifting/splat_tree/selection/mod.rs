@@ -1,0 +1,210 @@
+//! Gaussians that marks select in the tree, from nothing or from a given selection.
+
+use std::collections::BTreeMap;
+
+use super::hierarchy::Hierarchy;
+use super::marks::{StrokeMark, StrokeMarks};
+use super::others::{OtherChange, OtherIdentities, left_text, taken_text};
+use crate::scene::IdentityId;
+
+/// Cost of ignoring a stroke entirely, in nodes that are cut off without any visible difference.
+const MARK: f64 = 10.0;
+/// Cost of area, per square of a stroke's length: for the selection of the first stroke, and for a later change.
+const FIRST: f64 = 0.01;
+const CHANGE: f64 = 0.5;
+/// Cost of area that a minus removes, and that a click adds.
+const REMOVE: f64 = 0.05;
+const ADD_BY_CLICK: f64 = 0.1;
+/// Cost of area of a given selection that a line changes, and that a click changes.
+const KNOWN: f64 = 16.0;
+const KNOWN_BY_CLICK: f64 = 0.1;
+/// The same for a click that corrects something known, from the first that is enough.
+const CORRECTED_BY_CLICK: [f64; 5] = [KNOWN_BY_CLICK, 0.4, 1.6, 6.4, KNOWN];
+
+/// Gaussians that marks select.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(crate) struct MarkedSplats {
+    /// True for each selected Gaussian.
+    pub(crate) is_in: Vec<bool>,
+    /// Effect of the last mark.
+    pub(crate) effect: MarkEffect,
+}
+
+/// Effect of a mark beside the selection itself.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(crate) struct MarkEffect {
+    /// True if it is a click that was kept from changing more of something known.
+    pub(crate) is_limited: bool,
+    /// Changes of all other identities.
+    pub(crate) others: Vec<OtherChange>,
+}
+
+impl MarkEffect {
+    /// Sentences on what the stroke left to others and took from them, by their `name`: "left 2 Gaussians of 'mouth'
+    /// as they were".
+    pub(crate) fn sentences(&self, name: &dyn Fn(IdentityId) -> String) -> [Option<String>; 2] {
+        [left_text(&self.others, name), taken_text(&self.others, name)]
+    }
+}
+
+impl Hierarchy {
+    /// Returns the Gaussians that the marks select, starting from the Gaussians `from` if a selection is corrected
+    /// (indices).
+    ///
+    /// Finds, stroke by stroke, the cheapest labels of the tree's nodes. A mark that is not followed has a cost. So
+    /// has each node with another label than its parent: less, the longer the node stood alone while the tree grew.
+    /// Changed area costs by the square of the stroke's length, so that a stroke is about something of its own size.
+    /// It costs least if a minus removes it, and little if a click adds it, since a click gives a place but no size.
+    pub(crate) fn select(&self, marks: &StrokeMarks, from: &[usize]) -> MarkedSplats {
+        self.marked(marks, from, &[KNOWN_BY_CLICK], &OtherIdentities::default())
+    }
+
+    /// Returns the Gaussians of something known, `from`, as marks correct it. The cost of area rises while a click
+    /// changes more than all of it and more than a click is about, so that a small part does not grow over all around
+    /// it. Of other identities, a mark changes hardly more than it touches.
+    pub(crate) fn correct(&self, marks: &StrokeMarks, from: &[usize], others: &OtherIdentities) -> MarkedSplats {
+        self.marked(marks, from, &CORRECTED_BY_CLICK, others)
+    }
+
+    /// `by_click` are the costs of area of a given selection that a click changes, from the first that is enough.
+    fn marked(&self, marks: &StrokeMarks, from: &[usize], by_click: &[f64], others: &OtherIdentities) -> MarkedSplats {
+        let mut labels = MarkedLabels::new(self, from);
+        let mut effect = MarkEffect::default();
+        for (k, stroke) in marks.strokes.iter().enumerate() {
+            effect = labels.follow(stroke, k == 0, by_click, others);
+        }
+        MarkedSplats { is_in: labels.is_in, effect }
+    }
+}
+
+/// Labels of leaves and Gaussians, while marks are followed one after another.
+struct MarkedLabels<'a> {
+    tree: &'a Hierarchy,
+    /// The given selection: true for its Gaussians, and for leaves with most of them.
+    given: Vec<bool>,
+    before: Vec<bool>,
+    is_given: bool,
+    /// Area of the given selection, square units.
+    known: f64,
+    /// Cost of each node for another label than its parent's.
+    alone: Vec<f64>,
+    /// Costs of the leaves for not following marks, being out and in.
+    marked: Vec<[f64; 2]>,
+    /// Labels of the leaves, and of the Gaussians.
+    now: Vec<bool>,
+    is_in: Vec<bool>,
+}
+
+impl<'a> MarkedLabels<'a> {
+    fn new(tree: &'a Hierarchy, from: &[usize]) -> Self {
+        let mut given = vec![false; tree.leaf.len()];
+        from.iter().for_each(|&i| given[i] = true);
+        let mut share = vec![[0_u32; 2]; tree.leaves];
+        for (leaf, is_in) in tree.leaf.iter().zip(&given) {
+            share[*leaf as usize][usize::from(*is_in)] += 1;
+        }
+        let before: Vec<bool> = share.iter().map(|[out, own]| own > out).collect();
+        let mut alone: Vec<f64> = tree.tree.nodes.iter().map(Hierarchy::price).collect();
+        if !from.is_empty() {
+            // The borders of the given selection are free, so that they stay and are not smoothed.
+            let fixed =
+                |leaf: usize| [before[leaf], !before[leaf]].map(|other| if other { f64::INFINITY } else { 0.0 });
+            let own = tree.cheapest(&fixed, &alone);
+            for (i, node) in tree.tree.nodes.iter().enumerate() {
+                let whole = node.parent.is_some_and(|p| own[p as usize]);
+                if own[i] != whole {
+                    alone[i] = 0.0;
+                }
+            }
+        }
+        let (marked, now, is_in) = (vec![[0.0; 2]; tree.leaves], before.clone(), given.clone());
+        let is_given = !from.is_empty();
+        let mut labels = Self { tree, given, before, is_given, known: 0.0, alone, marked, now, is_in };
+        labels.known = labels.area(&|leaf| labels.before[leaf]);
+        labels
+    }
+
+    /// Area of some leaves, square units.
+    fn area(&self, of: &dyn Fn(usize) -> bool) -> f64 {
+        (0..self.tree.leaves).filter(|leaf| of(*leaf)).map(|leaf| self.tree.tree.nodes[leaf].area).sum()
+    }
+
+    /// Follows a mark.
+    fn follow(
+        &mut self,
+        stroke: &StrokeMark,
+        is_first: bool,
+        by_click: &[f64],
+        others: &OtherIdentities,
+    ) -> MarkEffect {
+        self.mark(stroke);
+        let change = match stroke {
+            StrokeMark { is_click, .. } if self.is_given => [if *is_click { by_click[0] } else { KNOWN }; 2],
+            _ if is_first => [FIRST; 2],
+            StrokeMark { is_plus: false, .. } => [REMOVE, CHANGE],
+            StrokeMark { is_click: true, .. } => [CHANGE, ADD_BY_CLICK],
+            _ => [CHANGE; 2],
+        };
+        let mut nodes = self.cheapest(stroke, change);
+        let mut is_limited = false;
+        for dearer in by_click[1..].iter().filter(|_| stroke.is_click) {
+            if self.area(&|leaf| nodes[leaf] != self.now[leaf]) <= self.known.max(stroke.size) {
+                break;
+            }
+            (nodes, is_limited) = (self.cheapest(stroke, [*dearer; 2]), true);
+        }
+        let mut flips = self.by_leaves(nodes);
+        let others = others.spare(&mut flips, &stroke.weights, &self.tree.area);
+        flips.iter().for_each(|&(gaussian, is_in)| self.is_in[gaussian as usize] = is_in);
+        MarkEffect { is_limited, others }
+    }
+
+    /// Weights of the leaves under a stroke, and their sum.
+    fn under(&self, stroke: &StrokeMark) -> (BTreeMap<u32, f64>, f64) {
+        let mut weights: BTreeMap<u32, f64> = BTreeMap::new();
+        for (gaussian, weight) in &stroke.weights {
+            *weights.entry(self.tree.leaf[*gaussian as usize]).or_default() += f64::from(*weight);
+        }
+        let all = weights.values().sum();
+        (weights, all)
+    }
+
+    /// Adds the costs for not following a mark.
+    fn mark(&mut self, stroke: &StrokeMark) {
+        let (weights, all) = self.under(stroke);
+        for (leaf, weight) in weights {
+            let [out, own] = &mut self.marked[leaf as usize];
+            let (against, follows) = if stroke.is_plus { (out, own) } else { (own, out) };
+            *against += MARK * weight / all;
+            // Of two opposite marks, the later one counts.
+            *follows = 0.0;
+        }
+    }
+
+    /// Cheapest labels of the nodes if changed area has these costs, by its new label.
+    fn cheapest(&self, stroke: &StrokeMark, change: [f64; 2]) -> Vec<bool> {
+        let change = change.map(|c| c / stroke.size.max(f64::MIN_POSITIVE));
+        let cost = |leaf: usize| {
+            let (mut cost, other) = (self.marked[leaf], usize::from(!self.now[leaf]));
+            cost[other] += change[other] * self.tree.tree.nodes[leaf].area;
+            cost
+        };
+        self.tree.cheapest(&cost, &self.alone)
+    }
+
+    /// Takes new labels of the leaves over; returns the Gaussians that change by that, with their new labels.
+    fn by_leaves(&mut self, mut nodes: Vec<bool>) -> Vec<(u32, bool)> {
+        nodes.truncate(self.tree.leaves);
+        self.now = nodes;
+        let label = |gaussian: usize| {
+            let leaf = self.tree.leaf[gaussian] as usize;
+            // Gaussians in leaves without a change are as they were given.
+            if self.now[leaf] != self.before[leaf] { self.now[leaf] } else { self.given[gaussian] }
+        };
+        let all = (0..self.is_in.len()).map(|gaussian| (gaussian as u32, label(gaussian)));
+        all.filter(|(gaussian, is_in)| self.is_in[*gaussian as usize] != *is_in).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests;

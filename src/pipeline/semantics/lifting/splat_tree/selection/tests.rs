@@ -1,0 +1,186 @@
+//! Selections on a sheet with a square of two colors, and on trees made by hand.
+
+use glam::DVec3;
+
+use super::super::hierarchy::tests::{H, W, cameras, hierarchy, sheet};
+use super::super::marks::Stroke;
+use super::*;
+use crate::pipeline::observer::Silent;
+use crate::pipeline::semantics::lifting::regions::tree::{Node, Tree};
+use crate::render::{RenderSettings, Renderer};
+use crate::scene::{GaussianCloud, Identities, IdentityId, Mask, SemanticMap};
+
+/// A dot around a place of the sheet in the first view.
+fn dot(at: [f64; 2], is_plus: bool) -> Stroke {
+    let camera = cameras().remove(0);
+    let p = camera.project(DVec3::new(at[0], at[1], 0.0)).expect("in front");
+    let near = |i: usize| ((i % W) as f64 + 0.5 - p.x).hypot((i / W) as f64 + 0.5 - p.y) < 1.5;
+    Stroke { camera, pixels: Mask::from_fn(W, H, near), is_plus }
+}
+
+/// A line between two places of the sheet in the first view.
+fn line(from: [f64; 2], to: [f64; 2], is_plus: bool) -> Stroke {
+    let place = |t: f64| [0, 1].map(|c| from[c] + t * (to[c] - from[c]));
+    let dots = (0..=20).map(|k| dot(place(f64::from(k) / 20.0), is_plus));
+    let all = dots.reduce(|mut a, b| {
+        a.pixels.add(&b.pixels);
+        a
+    });
+    all.expect("dots")
+}
+
+fn marks(cloud: &GaussianCloud, strokes: &[Stroke]) -> StrokeMarks {
+    let mut marks = StrokeMarks::default();
+    for stroke in strokes {
+        marks.add(&mut Renderer::new(), cloud, &RenderSettings::default(), stroke).expect("drawn");
+    }
+    marks
+}
+
+/// A tree of leaves with these numbers of Gaussians, of area 1 each, and of merges with their unlikeness.
+fn made(sizes: &[usize], merges: &[([u32; 2], f64)]) -> Hierarchy {
+    let leaf: Vec<u32> = (0..).zip(sizes).flat_map(|(k, n)| std::iter::repeat_n(k, *n)).collect();
+    let last = merges.last().map_or(0.0, |m| m.1);
+    let node = |area| Node { children: None, parent: None, birth: 0.0, death: last, area };
+    let mut nodes: Vec<Node> = sizes.iter().map(|n| node(*n as f64)).collect();
+    for &(children, birth) in merges {
+        let parent = nodes.len() as u32;
+        for child in children.map(|c| c as usize) {
+            (nodes[child].parent, nodes[child].death) = (Some(parent), birth);
+        }
+        let area = children.iter().map(|c| nodes[*c as usize].area).sum();
+        nodes.push(Node { children: Some(children), birth, ..node(area) });
+    }
+    Hierarchy { area: vec![1.0; leaf.len()], leaves: sizes.len(), leaf, tree: Tree { nodes } }
+}
+
+/// A click on these Gaussians that adds.
+fn click(on: &[u32]) -> StrokeMark {
+    let weights = on.iter().map(|i| (*i, 1.0)).collect();
+    StrokeMark { weights, is_plus: true, is_click: true, size: 100.0 }
+}
+
+/// Counts the selected Gaussians of each of the three.
+fn counts(selected: &[bool], whose: &[usize]) -> [usize; 3] {
+    [0, 1, 2].map(|k| selected.iter().zip(whose).filter(|(s, w)| **s && **w == k).count())
+}
+
+#[test]
+fn a_click_takes_what_it_is_on_and_corrections_add_and_remove() {
+    let (cloud, whose) = sheet();
+    let tree = hierarchy(&cloud);
+    let [left, right, gray] = [[-0.15, 0.0], [0.15, 0.0], [-0.6, -0.6]];
+    let select = |strokes: &[Stroke], from: &[usize]| counts(&tree.select(&marks(&cloud, strokes), from).is_in, &whose);
+    // The rims of the three are of mixed colors; inside of them are 40, 40 and more of the gray.
+    let one = select(&[dot(left, true)], &[]);
+    let both = select(&[dot(left, true), dot(right, true)], &[]);
+    let back = select(&[dot(left, true), dot(right, true), dot(right, false)], &[]);
+    // The corrected selection stays, except for the marked Gaussians.
+    let from: Vec<usize> = (0..whose.len()).filter(|i| whose[*i] > 0).collect();
+    let without = select(&[dot(left, false)], &from);
+    let other = select(&[dot(gray, true)], &[]);
+    assert!(one[1] >= 40 && one[0] + one[2] <= 8, "{one:?}");
+    assert!(both[1] >= 40 && both[2] >= 40 && both[0] <= 8, "{both:?}");
+    assert!(back[1] >= 40 && back[2] <= 8 && back[0] <= 8, "{back:?}");
+    assert!(without[1] <= 32 && without[2] >= 64 && without[0] == 0, "{without:?}");
+    // Controls: no mark, nothing; a mark elsewhere selects something else.
+    assert_eq!(select(&[], &[]), [0; 3]);
+    assert!(other[0] >= 400 && other[1] + other[2] <= 8, "{other:?}");
+}
+
+#[test]
+fn what_is_known_keeps_its_borders_and_a_line_corrects_what_it_covers() {
+    let (cloud, whose) = sheet();
+    let tree = hierarchy(&cloud);
+    // The given selection ends without a visible border: the upper gray, and all of the blue.
+    let from: Vec<usize> = (0..whose.len()).filter(|i| whose[*i] == 2 || whose[*i] == 0 && i / 32 < 9).collect();
+    let select = |stroke: &Stroke| tree.select(&marks(&cloud, std::slice::from_ref(stroke)), &from).is_in;
+    let without_blue = select(&line([0.15, -0.2], [0.15, 0.2], false));
+    let [gray, red, blue] = counts(&without_blue, &whose);
+    assert!(gray == 288 && red == 0 && (40..64).contains(&blue), "{gray} {red} {blue}");
+    let with_red = select(&line([-0.15, -0.2], [-0.15, 0.2], true));
+    let [gray, red, blue] = counts(&with_red, &whose);
+    assert!((280..300).contains(&gray) && (8..40).contains(&red) && blue >= 64, "{gray} {red} {blue}");
+    // In the middle of an even area, hardly more than the line itself.
+    let lower = select(&line([-0.6, 0.6], [0.0, 0.6], true));
+    let more = counts(&lower, &whose)[0] - 288;
+    assert!((8..120).contains(&more), "{more} of the lower gray");
+    // The control: from nothing, the same line selects the whole even area.
+    let alone = tree.select(&marks(&cloud, &[line([-0.6, 0.6], [0.0, 0.6], true)]), &[]).is_in;
+    assert!(counts(&alone, &whose)[0] > 400);
+}
+
+#[test]
+fn a_click_beside_a_small_part_does_not_take_all_around_it() {
+    let (cloud, whose) = sheet();
+    let tree = hierarchy(&cloud);
+    // A corner of the gray, and a click on the gray beside it, on the upper left and far from its other borders.
+    let is_corner = |i: usize| i % 32 < 5 && i / 32 < 5;
+    let from: Vec<usize> = (0..whose.len()).filter(|i| is_corner(*i)).collect();
+    let click = marks(&cloud, &[dot([-0.5, -0.65], true)]);
+    let found = tree.correct(&click, &from, &OtherIdentities::default());
+    let added = |of: &[bool]| (0..whose.len()).filter(|i| of[*i] && !is_corner(*i)).count();
+    let (few, all) = (added(&found.is_in), added(&tree.select(&click, &from).is_in));
+    assert!(few < 60 && found.effect.is_limited, "{few}");
+    assert!(from.iter().all(|i| found.is_in[*i]), "what was known stays");
+    assert!(few < all, "the control, of what is only given: {few} of {all}");
+}
+
+#[test]
+fn the_last_stroke_is_taken_back_and_selecting_twice_gives_the_same() {
+    let (cloud, whose) = sheet();
+    let tree = hierarchy(&cloud);
+    let mut all = marks(&cloud, &[dot([-0.15, 0.0], true), dot([0.15, 0.0], true)]);
+    let both = tree.select(&all, &[]).is_in;
+    assert_eq!(both, hierarchy(&cloud).select(&all, &[]).is_in);
+    all.remove_last();
+    let one = tree.select(&all, &[]).is_in;
+    assert_eq!(one, tree.select(&marks(&cloud, &[dot([-0.15, 0.0], true)]), &[]).is_in);
+    assert_ne!(counts(&one, &whose), counts(&both, &whose));
+    all.remove_last();
+    all.remove_last();
+    assert_eq!((all.len(), counts(&tree.select(&all, &[]).is_in, &whose)), (0, [0; 3]));
+}
+
+#[test]
+fn clouds_of_none_of_one_and_of_many_in_one_place() {
+    let settings = RenderSettings::default();
+    for n in [0, 1, 2] {
+        let cloud = GaussianCloud::isotropic(vec![[0.0; 3]; n], -2.0, 3.0);
+        for cameras in [cameras(), Vec::new()] {
+            let tree = Hierarchy::new(&cloud, &cameras, &settings, &mut Silent).expect("made");
+            let selected = tree.select(&marks(&cloud, &[dot([0.0, 0.0], true)]), &[]).is_in;
+            assert_eq!(selected.len(), n);
+        }
+    }
+    // All in one place, and one far off that no view shows.
+    let mut cloud = GaussianCloud::isotropic(vec![[0.0; 3]; 40], -2.0, 3.0);
+    cloud.positions[39] = [1e6, 0.0, 0.0];
+    let tree = Hierarchy::new(&cloud, &cameras(), &settings, &mut Silent).expect("made");
+    let selected = tree.select(&marks(&cloud, &[dot([0.0, 0.0], true)]), &[]).is_in;
+    assert!(selected[..39].iter().any(|s| *s) && !selected[39]);
+}
+
+#[test]
+fn what_a_click_does_not_touch_stays_with_its_identity() {
+    // Two leaves that hardly differ, and the thing itself, which does. The second leaf is a mouth.
+    let tree = made(&[10, 10, 10], &[([1, 2], 0.1), ([0, 3], 10.0)]);
+    let from: Vec<usize> = (0..10).collect();
+    let of: Vec<IdentityId> = [1, 0, 2].into_iter().flat_map(|id| [id; 10]).collect();
+    let map = SemanticMap::from_identities(Identities::objects(2), of, vec![1.0; 30], Vec::new());
+    let others = OtherIdentities::new(&map, 1);
+    let correct = |strokes: Vec<StrokeMark>, others: &OtherIdentities| {
+        let found = tree.correct(&StrokeMarks { strokes }, &from, others);
+        ([0, 10, 20].map(|i| found.is_in[i..i + 10].iter().filter(|s| **s).count()), found.effect.others)
+    };
+    let mouth = |is_left| vec![OtherChange { id: 2, gaussians: 10, share: 1.0, is_left }];
+    // The control: as long as nothing is known of the mouth, it is taken with what is clicked on.
+    assert_eq!(correct(vec![click(&[10, 11])], &OtherIdentities::default()), ([10; 3], Vec::new()));
+    assert_eq!(correct(vec![click(&[10, 11])], &others), ([10, 10, 0], mouth(true)));
+    // It is taken and told by a click that touches it, also a later one.
+    assert_eq!(correct(vec![click(&[10, 20])], &others), ([10; 3], mouth(false)));
+    assert_eq!(correct(vec![click(&[10, 11]), click(&[25])], &others), ([10; 3], mouth(false)));
+    assert_eq!(correct(vec![click(&[10, 11]), click(&[12])], &others), ([10, 10, 0], mouth(true)));
+    // What is taken is no change any more.
+    assert_eq!(correct(vec![click(&[10, 20]), click(&[11])], &others), ([10; 3], Vec::new()));
+}
