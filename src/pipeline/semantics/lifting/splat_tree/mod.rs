@@ -15,4 +15,4 @@ mod labels;
 mod leaves;
 pub(crate) mod marks;
 pub(crate) mod stored;
-mod surface;
+pub(crate) mod surface;
