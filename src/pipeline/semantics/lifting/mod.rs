@@ -12,6 +12,8 @@
 //!    in the paper.
 //! 5. [`embed`] gives every identity its embedding; [`mask_vectors`] takes it from vectors that came with the masks.
 //!
+//! Views of the photos are drawn by [`renderers`], several at once; [`kept_views`] serve those that are weighed again.
+//!
 //! A known map changes by [`edit`], [`add_photo`] and the masks of close-ups ([`closer`]). [`keep`] holds edited objects in a new search, and [`carry`]
 //! takes the map to other Gaussians of the scene.
 

@@ -6,8 +6,11 @@ use rstar::primitives::GeomWithData;
 
 use crate::scene::GaussianCloud;
 
+/// The nearest Gaussians of each, by index and squared distance, nearest first.
+pub(crate) type NearestGaussians = Vec<Vec<(usize, f64)>>;
+
 /// Returns, for every Gaussian, its `n` nearest ones, by index and squared distance, nearest first.
-pub(super) fn nearest(cloud: &GaussianCloud, n: usize) -> Vec<Vec<(usize, f64)>> {
+pub(super) fn nearest(cloud: &GaussianCloud, n: usize) -> NearestGaussians {
     let points: Vec<GeomWithData<[f64; 3], usize>> =
         cloud.positions.iter().enumerate().map(|(i, p)| GeomWithData::new(p.map(f64::from), i)).collect();
     let tree = RTree::bulk_load(points.clone());

@@ -3,7 +3,7 @@
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
-use super::nearest::nearest;
+use super::nearest::{NearestGaussians, nearest};
 use super::votes::{Assignment, UNKNOWN};
 use crate::math::sh::SH_C0;
 use crate::math::stats::median;
@@ -16,12 +16,18 @@ const COLOR_WEIGHT: f64 = 12.0;
 
 /// Labels every Gaussian without a vote like the nearest one with a vote along the graph of neighbors, up to
 /// `farthest` typical distances between neighbors. Steps are longer the more the colors differ. Unlabeled Gaussians
-/// are inherited from like the rest; without any near vote, a Gaussian becomes unlabeled.
-pub(crate) fn extend(cloud: &GaussianCloud, assignments: &mut [Assignment], farthest: f64) {
+/// are inherited from like the rest; without any near vote, a Gaussian becomes unlabeled. `known` are at least
+/// [`NEIGHBORS`] nearest Gaussians of each, if they have been sought.
+pub(crate) fn extend(
+    cloud: &GaussianCloud,
+    known: Option<NearestGaussians>,
+    assignments: &mut [Assignment],
+    farthest: f64,
+) {
     if assignments.iter().all(|b| b.identity != UNKNOWN) {
         return;
     }
-    let near = nearest(cloud, NEIGHBORS);
+    let near = known.unwrap_or_else(|| nearest(cloud, NEIGHBORS));
     let spacing =
         median(&near.iter().filter_map(|n| n.first()).map(|n| n.1.sqrt()).filter(|d| *d > 0.0).collect::<Vec<_>>());
     let spacing = if spacing.is_finite() { spacing } else { 1.0 };
@@ -35,7 +41,7 @@ pub(crate) fn extend(cloud: &GaussianCloud, assignments: &mut [Assignment], fart
     // Edges count in both directions: isolated Gaussians have neighbors that do not have them.
     let mut edges: Vec<Vec<(usize, f64)>> = vec![Vec::new(); near.len()];
     for (i, neighbors) in near.iter().enumerate() {
-        for &(j, far2) in neighbors {
+        for &(j, far2) in neighbors.iter().take(NEIGHBORS) {
             let length = step(i, j, far2.sqrt());
             edges[i].push((j, length));
             edges[j].push((i, length));
@@ -82,9 +88,17 @@ mod tests {
         let mut b = vec![Assignment { identity: UNKNOWN, margin: 0.0 }; 30];
         b[0].identity = 1;
         b[29].identity = NO_IDENTITY;
-        extend(&cloud, &mut b, 40.0);
+        extend(&cloud, None, &mut b, 40.0);
         assert!(b[..18].iter().all(|b| b.identity == 1), "{b:?}");
         assert!(b[18..].iter().all(|b| b.identity == NO_IDENTITY));
+        // More neighbors than are needed, sought for something else, change nothing.
+        let mut again = vec![Assignment { identity: UNKNOWN, margin: 0.0 }; 30];
+        (again[0].identity, again[29].identity) = (1, NO_IDENTITY);
+        let mut control = again.clone();
+        extend(&cloud, Some(nearest(&cloud, NEIGHBORS + 2)), &mut again, 40.0);
+        assert_eq!(again, b);
+        extend(&cloud, Some(vec![Vec::new(); 30]), &mut control, 40.0);
+        assert_ne!(control, b, "the control, without neighbors");
     }
 
     #[test]
@@ -95,10 +109,10 @@ mod tests {
         }
         let mut b = vec![Assignment { identity: UNKNOWN, margin: 0.0 }; 30];
         b[3] = Assignment { identity: 2, margin: 0.5 };
-        extend(&cloud, &mut b, 40.0);
+        extend(&cloud, None, &mut b, 40.0);
         assert!(b[..15].iter().all(|b| b.identity == 2) && b[15..].iter().all(|b| b.identity == NO_IDENTITY));
         assert_eq!((b[3].margin, b[4].margin), (0.5, 0.0));
-        extend(&GaussianCloud::default(), &mut [], 40.0);
+        extend(&GaussianCloud::default(), None, &mut [], 40.0);
     }
 
     #[test]
@@ -109,7 +123,7 @@ mod tests {
             cloud.sh[5..].iter_mut().for_each(|c| c[0] += (jump / SH_C0) as f32);
             let mut b = vec![Assignment { identity: UNKNOWN, margin: 0.0 }; 60];
             b[0].identity = 3;
-            extend(&cloud, &mut b, 40.0);
+            extend(&cloud, None, &mut b, 40.0);
             let reached = b.iter().filter(|b| b.identity == 3).count();
             // Half a step either way for rounding; the first one counts.
             assert!((reach..=reach + 1).contains(&reached), "{jump}: {reached}");

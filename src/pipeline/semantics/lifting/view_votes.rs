@@ -125,17 +125,20 @@ mod tests {
     struct Reference<'a> {
         labels: &'a [IdentityId],
         width: usize,
+        gaussian: u32,
+        /// Place of its first sum.
+        first: usize,
         found: Vec<(u32, IdentityId, f32)>,
-        tile: usize,
     }
 
     impl ContributionSink<f32> for Reference<'_> {
         fn add(&mut self, gaussian: u32, x: usize, y: usize, weights: &Lane<f32>) {
-            let same_tile = std::mem::replace(&mut self.tile, x / TILE_PX) == x / TILE_PX;
+            if gaussian != self.gaussian {
+                (self.gaussian, self.first) = (gaussian, self.found.len());
+            }
             for k in (0..LANES.min(self.width - x)).filter(|k| weights[*k] > 0.0) {
                 let label = self.labels[y * self.width + x + k];
-                let own = self.found.iter_mut().rev().take_while(|f| same_tile && f.0 == gaussian);
-                match own.into_iter().find(|f| f.1 == label) {
+                match self.found[self.first..].iter_mut().find(|f| f.1 == label) {
                     Some(found) => found.2 += weights[k],
                     None => self.found.push((gaussian, label, weights[k])),
                 }
@@ -164,7 +167,7 @@ mod tests {
             _ => UNKNOWN,
         };
         let labels: Vec<IdentityId> = (0..43 * 37).map(label).collect();
-        let row = || Reference { labels: &labels, width: 43, found: Vec::new(), tile: usize::MAX };
+        let row = || Reference { labels: &labels, width: 43, gaussian: u32::MAX, first: 0, found: Vec::new() };
         let mut rows: Vec<Reference<'_>> = (0..37_usize.div_ceil(TILE_PX)).map(|_| row()).collect();
         renderer.contributions(&cloud, &from(0.0), &settings, &mut rows).expect("drawn");
         let expected: Vec<_> = rows.into_iter().flat_map(|r| r.found).collect();

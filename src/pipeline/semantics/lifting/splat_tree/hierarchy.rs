@@ -1,9 +1,10 @@
 //! Tree of Gaussians that belong together.
 
 use super::leaves::{borders, leaves};
-use super::surface::SplatSurface;
+use super::surface::{NEIGHBORS, SplatSurface};
 use crate::pipeline::observer::Observer;
 use crate::pipeline::semantics::lifting::error::FindError;
+use crate::pipeline::semantics::lifting::nearest::nearest;
 use crate::pipeline::semantics::lifting::regions::segment::unlike;
 use crate::pipeline::semantics::lifting::regions::tree::{Piece, Tree, grow};
 use crate::render::RenderSettings;
@@ -28,10 +29,11 @@ impl Hierarchy {
         settings: &RenderSettings,
         observer: &mut dyn Observer,
     ) -> Result<Self, FindError> {
-        Ok(Self::of(&SplatSurface::new(cloud, cameras, settings, observer)?))
+        Ok(Self::of(&SplatSurface::new(cloud, &nearest(cloud, NEIGHBORS), cameras, settings, observer)?))
     }
 
-    fn of(surface: &SplatSurface) -> Self {
+    /// Builds the tree of a surface.
+    pub(crate) fn of(surface: &SplatSurface) -> Self {
         let (leaf, count) = leaves(surface);
         let mut pieces = vec![Piece { area: 0.0, sums: vec![0.0; 3] }; count];
         for (piece, leaf) in surface.pieces.iter().zip(&leaf) {

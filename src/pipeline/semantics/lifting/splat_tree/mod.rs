@@ -18,4 +18,4 @@ pub(crate) mod marks;
 pub(crate) mod others;
 pub(crate) mod selection;
 pub(crate) mod stored;
-mod surface;
+pub(crate) mod surface;

@@ -5,7 +5,7 @@ use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
 use super::super::error::FindError;
-use super::super::nearest::nearest;
+use super::super::nearest::NearestGaussians;
 use super::super::regions::edges::{ImagePlanes, strength};
 use super::super::regions::lab::{lab, planes};
 use super::super::regions::shape::ends;
@@ -17,7 +17,7 @@ use crate::render::{ContributionSink, Features, RenderError, RenderSettings, Ren
 use crate::scene::{Camera, GaussianCloud};
 
 /// Number of neighbors searched for each Gaussian.
-const NEIGHBORS: usize = 10;
+pub(crate) const NEIGHBORS: usize = 10;
 /// Largest distance of two neighbors, as a multiple of the distance to the last neighbor of either.
 const FAR: f64 = 10.0;
 /// Longer side of the views, px.
@@ -30,7 +30,7 @@ const LEAST_SEEN: f32 = 0.1;
 const SOLID: f32 = 0.3;
 
 /// A cloud's surface.
-pub(super) struct SplatSurface {
+pub(crate) struct SplatSurface {
     /// Area of each Gaussian, square units, and the sum of its color's planes over that.
     pub(super) pieces: Vec<Piece>,
     /// Neighbors, the smaller index first.
@@ -49,9 +49,10 @@ struct Look {
 }
 
 impl SplatSurface {
-    /// Renders the Gaussians through some of these cameras.
-    pub(super) fn new(
+    /// Renders the Gaussians, whose [`NEIGHBORS`] are `near`, through some of these cameras.
+    pub(crate) fn new(
         cloud: &GaussianCloud,
+        near: &NearestGaussians,
         cameras: &[Camera],
         settings: &RenderSettings,
         observer: &mut dyn Observer,
@@ -75,7 +76,7 @@ impl SplatSurface {
         for look in &looks {
             best.iter_mut().zip(&look.areas).for_each(|(b, a)| *b = b.max(*a));
         }
-        let edges = neighbors(cloud);
+        let edges = neighbors(near);
         let colors = own_colors(cloud, &colors);
         let borders = edges.par_iter().map(|&edge| border(cloud, &looks, &best, &colors, edge)).collect();
         let piece = |(color, area): (&[f32; 3], &f32)| {
@@ -185,8 +186,7 @@ fn own_colors(cloud: &GaussianCloud, seen: &[[f32; 4]]) -> Vec<[f32; 3]> {
 }
 
 /// Returns the nearest neighbors of all Gaussians, each pair once.
-fn neighbors(cloud: &GaussianCloud) -> Vec<(u32, u32)> {
-    let around = nearest(cloud, NEIGHBORS);
+fn neighbors(around: &NearestGaussians) -> Vec<(u32, u32)> {
     let reach: Vec<f64> = around.iter().map(|near| near.last().map_or(0.0, |(_, far2)| *far2)).collect();
     let near = |(a, b, far2): &(usize, usize, f64)| *far2 <= FAR.powi(2) * reach[*a].min(reach[*b]);
     let pairs = around.iter().enumerate().flat_map(|(p, near)| near.iter().map(move |&(q, far2)| (p, q, far2)));

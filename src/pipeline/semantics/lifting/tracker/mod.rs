@@ -21,12 +21,14 @@ use super::error::FindError;
 use super::floaters::drop_floaters;
 use super::kept_views::{KEPT_BYTES, KeptViews};
 use super::mirror::guess;
+use super::nearest::{NearestGaussians, nearest};
 use super::propagate::extend;
 use super::removed::RemovedThings;
 use super::renderers::Renderers;
 use super::sam2_tracker::{LABEL_SIDE_PX, Sam2Tracker};
 use super::segmenter::{FoundMask, Segmenter};
 use super::splat_tree::hierarchy::Hierarchy;
+use super::splat_tree::surface::{NEIGHBORS, SplatSurface};
 use super::train_codes::{CODE_SIDE_PX, CodeView};
 use super::view_votes::ViewVotes;
 use super::votes::{Assignment, LEAST_VOTES, UNKNOWN, Votes};
@@ -113,26 +115,26 @@ pub(crate) fn track(
         views = t.look(&t.decided(), observer)?;
     }
     let (said, inferred) = (t.votes.clone(), views.iter().map(|v| v.unknown).collect());
-    if options.by_photos {
-        t.complete(&views, observer)?;
-    }
-    let mut assignments = if options.by_tree {
-        begin("Grouping Gaussians", observer)?;
-        let start = Instant::now();
-        let cameras: Vec<_> = photos.iter().map(|p| p.camera.clone()).collect();
-        let tree = Hierarchy::new(cloud, &cameras, settings, observer)?;
-        let labels = tree.label(&said, &t.votes, &t.identities, LEAST_VOTES);
-        t.secs.add(CarryStage::Group, start);
-        labels
-    } else {
-        t.votes.decide(&t.identities, LEAST_VOTES)
+    let surface = options.by_tree.then(|| t.surface(observer)).transpose()?;
+    let (surface, near) = surface.unzip();
+    // The tree is made without any label, so completion goes on beside it.
+    let (tree, completed) = rayon::join(
+        || surface.as_ref().map(Hierarchy::of),
+        || if options.by_photos { t.complete(&views, observer) } else { Ok(()) },
+    );
+    completed?;
+    let begun = Instant::now();
+    let mut assignments = match tree {
+        Some(tree) => tree.label(&said, &t.votes, &t.identities, LEAST_VOTES),
+        None => t.votes.decide(&t.identities, LEAST_VOTES),
     };
+    t.secs.add(CarryStage::Group, begun);
     let views = t.look(&identities_of(&assignments), observer)?;
     t.small = KeptViews::new(0, 0);
     if options.by_mirror {
         guess(cloud, &t.identities, &said, &mut assignments, observer)?;
     }
-    extend(cloud, &mut assignments, options.hidden_steps);
+    extend(cloud, near, &mut assignments, options.hidden_steps);
     drop_floaters(cloud, &t.identities, &mut assignments);
     if let Some(map) = &options.known {
         for (i, now) in assignments.iter_mut().enumerate() {
@@ -197,6 +199,17 @@ impl Tracker<'_> {
         })?;
         self.secs.add(CarryStage::See, start);
         Ok(())
+    }
+
+    /// Returns the surface of the Gaussians, and the nearest ones of each.
+    fn surface(&mut self, observer: &mut dyn Observer) -> Result<(SplatSurface, NearestGaussians), FindError> {
+        let start = Instant::now();
+        begin("Grouping Gaussians", observer)?;
+        let cameras: Vec<_> = self.photos.iter().map(|p| p.camera.clone()).collect();
+        let near = nearest(self.cloud, NEIGHBORS);
+        let surface = SplatSurface::new(self.cloud, &near, &cameras, self.settings, observer)?;
+        self.secs.add(CarryStage::Group, start);
+        Ok((surface, near))
     }
 
     /// Segments a photo, links its masks to known identities, and lets them vote. Returns the masks and their

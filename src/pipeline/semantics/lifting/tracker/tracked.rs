@@ -68,7 +68,7 @@ pub(super) enum CarryStage {
     Read,
     /// Growth of labels in photos, and its votes.
     Grow,
-    /// The tree of Gaussians, and its labels.
+    /// The surface of the Gaussians, and the labels by their tree, which is made beside the two stages before.
     Group,
 }
 
