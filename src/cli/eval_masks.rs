@@ -11,6 +11,7 @@ use crate::jobs::evaluate_masks::{self, Protocol, ProtocolSummary};
 use crate::math::format::count;
 use crate::math::stats::mean;
 use crate::pipeline::semantics::evaluation::Unit;
+use crate::pipeline::semantics::evaluation::known_things::WorstOther;
 use crate::pipeline::semantics::evaluation::limits::{Cause, LimitRow, SIZES};
 use crate::pipeline::semantics::evaluation::part_recall::{HIT_IOU, Row};
 use crate::pipeline::semantics::evaluation::recipes::RecipeRow;
@@ -86,8 +87,13 @@ fn summary(summary: &ProtocolSummary) -> String {
         }
         ProtocolSummary::Strokes { gaussians, prepare_secs, rows } => {
             let table = output::table(&strokes(rows));
-            let gaussians = count(*gaussians as u64);
-            format!("{gaussians} Gaussians, made ready in {prepare_secs:.1} s\n{table}")
+            let left: usize = rows.iter().flat_map(|r| r.left).sum();
+            let along = rows.iter().flat_map(|r| r.along).filter(|is| *is).count();
+            let [gaussians, left] = [*gaussians, left].map(|n| count(n as u64));
+            format!(
+                "{gaussians} Gaussians, made ready in {prepare_secs:.1} s; strokes left {left} untouched ones to other \
+                 things, and {along} changed only what is along them\n{table}"
+            )
         }
         ProtocolSummary::Recipes { absent, rows } => {
             let table = output::table(&recipes(rows, *absent));
@@ -109,17 +115,26 @@ fn limits(rows: &[LimitRow]) -> Vec<Vec<String>> {
     table
 }
 
-/// Things by how well strokes select them, the worst first, and the means.
+/// Things by how well strokes select them, the worst first, and the means; of corrections, also the largest loss of any
+/// other thing by each stroke.
 fn strokes(rows: &[StrokeRow]) -> Vec<Vec<String>> {
     let mut sorted: Vec<&StrokeRow> = rows.iter().collect();
     sorted.sort_by(|a, b| a.iou[STROKES].total_cmp(&b.iou[STROKES]));
     let head = ["", "level", "drawn in", "before", "1 stroke", "2", "3", "ms"];
-    let mut table = vec![head.map(str::to_owned).to_vec()];
+    let others = ["others: worst change by 1", "2", "3", "of"];
+    let has_others = rows.iter().any(|r| !r.others.is_empty());
+    let mut table =
+        vec![head.into_iter().chain(others.into_iter().filter(|_| has_others)).map(str::to_owned).collect()];
     let row = |name: &str, level: &str, view: &str, of: &[&StrokeRow]| {
         let after = |k: usize| mean(&of.iter().map(|r| r.iou[k]).collect::<Vec<_>>());
         let ms: Vec<f64> = of.iter().flat_map(|r| r.ms).filter(|ms| *ms > 0.0).collect();
         let mut row = [name, level, view].map(str::to_owned).to_vec();
         row.extend((0..=STROKES).map(|k| format!("{:.3}", after(k))).chain([format!("{:.0}", mean(&ms))]));
+        let lost =
+            |k: usize| of.iter().filter_map(move |r| r.others.get(k)).min_by(|a, b| a.change.total_cmp(&b.change));
+        let worst: Vec<&WorstOther> = (0..STROKES).filter_map(lost).collect();
+        row.extend(worst.iter().map(|worst| format!("{:.3}", worst.change)));
+        row.extend(worst.into_iter().min_by(|a, b| a.change.total_cmp(&b.change)).map(|worst| worst.name.clone()));
         row
     };
     let level = |r: &StrokeRow| if r.level == Level::Object { "object" } else { "part" };
@@ -161,4 +176,35 @@ fn ablation(rows: &[Row]) -> Vec<Vec<String>> {
         ]
     }));
     table
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_largest_loss_of_others_stands_beside_each_stroke_of_a_correction() {
+        let worst = |name: &str, change| WorstOther { name: name.into(), change };
+        let row = |name: &str, others| StrokeRow {
+            name: name.into(),
+            level: Level::Part,
+            drawn_in: "view".into(),
+            views: 2,
+            iou: [0.5; STROKES + 1],
+            ms: [1.0; STROKES],
+            others,
+            left: [0; STROKES],
+            along: [false; STROKES],
+        };
+        let mouth = row("mouth", vec![worst("", 0.0), worst("face", -0.25), worst("ear", -0.125)]);
+        let ear = row("ear", vec![worst("mouth", -0.5), worst("", 0.0), worst("", 0.0)]);
+        let table = strokes(&[mouth, ear]);
+        let others = |k: usize| table[k][8..].to_vec();
+        assert_eq!(others(0), ["others: worst change by 1", "2", "3", "of"]);
+        assert_eq!(others(1), ["0.000", "-0.250", "-0.125", "face"]);
+        assert_eq!(others(4), ["-0.500", "-0.250", "-0.125", "mouth"], "the worst of all parts");
+        assert!(others(3).is_empty(), "there are no objects");
+        // The control: things that are only selected.
+        assert!(strokes(&[row("mouth", Vec::new())]).iter().all(|row| row.len() == 8));
+    }
 }

@@ -31,7 +31,8 @@ use crate::scene::{Camera, LevelFilter, SemanticMap};
     fmlgs segment scene/ \"the kettle\" --out kettle.spz\n  \
     fmlgs segment scene/ --all --out everything/ --masks isat,coco --views 0,12\n  \
     fmlgs segment scene/ --all --out everything/ --format sog --views none\n  \
-    fmlgs segment scene/ --click 320,200 --view 0003.png --keep \"kettle\"")]
+    fmlgs segment scene/ --click 320,200 --view 0003.png --keep \"kettle\"\n  \
+    fmlgs segment scene/ --click 350,190 --width 8 --view 0003.png --correct \"kettle\"")]
 pub(crate) struct SegmentArgs {
     /// Trained scene with objects and parts ('fmlgs preprocess')
     scene: PathBuf,
@@ -42,7 +43,7 @@ pub(crate) struct SegmentArgs {
     #[arg(long, conflicts_with_all = ["text", "rest", "top", "kind", "RecipeArgs"])]
     all: bool,
     /// Write to this file, or folder for --all
-    #[arg(long, required_unless_present = "keep")]
+    #[arg(long, required_unless_present_any = ["keep", "correct"])]
     out: Option<PathBuf>,
     /// Format of the files of --all
     #[arg(long, requires = "all", value_enum, default_value = "ply")]

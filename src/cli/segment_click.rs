@@ -1,11 +1,12 @@
-//! `fmlgs segment --click`: Gaussians by places in a view instead of words, and a name for them.
+//! `fmlgs segment --click`: Gaussians by places in a view instead of words, and a name for them; or a correction of what
+//! has a name.
 
 use std::path::PathBuf;
 use std::sync::Arc;
 
 use super::export::MeasureArgs;
 use super::progress::Console;
-use super::{CliError, output, view};
+use super::{CliError, number, output, view};
 use crate::io::scene_files::SELECTION_FILE;
 use crate::jobs::edit::{self, EditRequest};
 use crate::jobs::select::{self, PrepareRequest, SelectFor, SelectRequest, SelectStep, Selected, Stroke, kept_as};
@@ -15,8 +16,6 @@ use crate::scene::{LevelFilter, Mask, NO_IDENTITY};
 
 /// Radius of a click as a share of the view's width.
 const CLICK: f32 = 0.006;
-/// Longer side of the view that clicks are taken in, px.
-const SIDE_PX: u32 = 512;
 
 #[derive(Debug, clap::Args)]
 pub(crate) struct ClickArgs {
@@ -29,6 +28,12 @@ pub(crate) struct ClickArgs {
     /// The view that is clicked in: an index, a photo's name or a camera file [default: the scene's first view]
     #[arg(long, requires = "click")]
     view: Option<String>,
+    /// Width of a click, px of the view [default: 1.2 % of its width]
+    #[arg(long, requires = "click", value_name = "PX", value_parser = number::within(1.0..=64.0_f32))]
+    width: Option<f32>,
+    /// Correct the object or part that this asks for, and keep it: clicks add to it, --click-out removes
+    #[arg(long, requires = "click", value_name = "TEXT", conflicts_with_all = ["keep", "part_of"])]
+    correct: Option<String>,
     /// Keep what is selected in the scene, as an object of this name
     #[arg(long, requires = "click")]
     keep: Option<String>,
@@ -59,9 +64,16 @@ pub(crate) fn run(
             .unwrap_or(NO_IDENTITY),
         None => NO_IDENTITY,
     };
-    let purpose = SelectFor::New(whole);
+    let purpose = match &args.correct {
+        Some(text) => {
+            let place = query::seen_from(scene, None);
+            SelectFor::Extent(query::one_named(&map, &place, text, LevelFilter::Auto)?)
+        }
+        None => SelectFor::New(whole),
+    };
     let full = view::choose(args.view.as_deref(), scene)?;
-    let camera = full.limited_to(SIDE_PX);
+    let radius_px = args.width.map_or(CLICK * full.width_px as f32, |width| 0.5 * width);
+    let camera = Stroke::view(&full, radius_px);
     let scale = camera.width_px as f32 / full.width_px as f32;
     let mut console = Console::new(quiet);
     let request = PrepareRequest {
@@ -80,7 +92,7 @@ pub(crate) fn run(
             return Err(CliError::failed(format!("{},{} lies outside the view, which has {size}", at[0], at[1])));
         }
         let (w, h) = (camera.width_px as usize, camera.height_px as usize);
-        let radius = (CLICK * w as f32).max(1.0);
+        let radius = (scale * radius_px).max(1.0);
         let near = |i: usize| {
             let [dx, dy] = [(i % w) as f32 + 0.5 - scale * at[0], (i / w) as f32 + 0.5 - scale * at[1]];
             dx.hypot(dy) <= radius
@@ -109,15 +121,20 @@ pub(crate) fn run(
         lines.push(count.clone());
         lines.extend(measure.write(scene.cloud.select(&kept), out, scene, quiet)?.lines());
     }
-    if let Some(name) = &args.keep {
+    if args.keep.is_some() || args.correct.is_some() {
         let folder = scene.folder.as_ref().ok_or_else(|| {
             CliError::failed(format!("{} is a bare splat: names are kept in trained scenes", scene.path.display()))
         })?;
-        let request = EditRequest::Apply(kept_as(&purpose, name.clone(), selected.gaussians.clone()));
+        let name = args.keep.clone().unwrap_or_default();
+        let request = EditRequest::Apply(kept_as(&purpose, name, selected.gaussians.clone()));
         let new = edit::apply(&scene.cloud, &map, &request)?;
         edit::store(folder, scene.state.as_deref(), &new, &scene.cloud)?;
-        let id = new.identities.len() as crate::scene::IdentityId;
-        lines.push(format!("kept as '{}': {count}", new.identities.full_name(id)));
+        let (done, id) = match purpose {
+            SelectFor::New(_) => ("kept as", new.identities.len() as crate::scene::IdentityId),
+            SelectFor::Extent(id) => ("corrected", id),
+        };
+        let name = new.identities.full_name(id);
+        lines.push(format!("{done} '{name}': {count}"));
         let emptied = edit::emptied(&map, &new);
         lines.extend(emptied.iter().map(|emptied| format!("{name} took all Gaussians of {emptied}")));
     }

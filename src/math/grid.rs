@@ -79,6 +79,31 @@ pub(crate) fn grown(width: usize, mut is: Vec<bool>, steps: usize) -> Vec<bool> 
     is
 }
 
+/// Distance of each pixel from the nearest one for which `is` holds, px; infinite if that is more than `most`.
+pub(crate) fn distances(width: usize, is: &[bool], most: usize) -> Vec<f64> {
+    let width = width.max(1);
+    // The nearest one in each row, then over the rows above and below.
+    let mut in_row = vec![usize::MAX; is.len()];
+    for (row, distance) in is.chunks(width).zip(in_row.chunks_mut(width)) {
+        for backward in [false, true] {
+            let mut last = None;
+            for k in 0..row.len() {
+                let x = if backward { row.len() - 1 - k } else { k };
+                last = if row[x] { Some(x) } else { last };
+                distance[x] = distance[x].min(last.map_or(usize::MAX, |last| x.abs_diff(last)));
+            }
+        }
+    }
+    let squared = |i: usize| {
+        let (x, y) = (i % width, i / width);
+        let rows = y.saturating_sub(most)..(y + most + 1).min(is.len() / width);
+        let near = rows.map(|row| (in_row[row * width + x], row.abs_diff(y))).filter(|(across, _)| *across <= most);
+        near.map(|(across, along)| across * across + along * along).min()
+    };
+    let distance = |squared: usize| (squared <= most * most).then(|| (squared as f64).sqrt());
+    (0..is.len()).map(|i| squared(i).and_then(distance).unwrap_or(f64::INFINITY)).collect()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -130,5 +155,22 @@ mod tests {
         let count = |v: Vec<bool>| v.iter().filter(|b| **b).count();
         assert_eq!([0, 1, 2].map(|steps| count(grown(3, one(4), steps))), [1, 5, 9]);
         assert_eq!(grown(3, one(0), 1), [true, true, false, true, false, false, false, false, false]);
+    }
+
+    #[test]
+    fn distances_are_those_of_the_nearest_pixel() {
+        let (w, h) = (17, 11);
+        let marked = [(3, 2), (12, 9), (13, 9)];
+        let is: Vec<bool> = (0..w * h).map(|i| marked.contains(&(i % w, i / w))).collect();
+        let found = distances(w, &is, 6);
+        for (i, found) in found.iter().enumerate() {
+            let to = |&(x, y): &(usize, usize)| (x as f64 - (i % w) as f64).hypot(y as f64 - (i / w) as f64);
+            let nearest = marked.iter().map(to).fold(f64::INFINITY, f64::min);
+            let expected = if nearest <= 6.0 { nearest } else { f64::INFINITY };
+            assert!(*found == expected || (found - expected).abs() < 1e-12, "{i}: {found}, not {expected}");
+        }
+        assert!(found.iter().any(|d| d.is_infinite()) && found.iter().filter(|d| **d == 0.0).count() == 3);
+        assert_eq!(distances(4, &[false; 8], 9), [f64::INFINITY; 8]);
+        assert!(distances(0, &[], 3).is_empty());
     }
 }

@@ -112,7 +112,9 @@ pub(super) const RULES: &[Rule] = &[
     }),
     // Objects as Gaussians.
     rule(&["segment"], &["format", "masks", "views", "max_side"], |g| when(!g.has("all"), "without --all")),
-    rule(&["segment"], &["click_out", "view", "keep", "part_of"], |g| when(!g.has("click"), "without --click")),
+    rule(&["segment"], &["click_out", "view", "width", "correct", "keep", "part_of"], |g| {
+        when(!g.has("click"), "without --click")
+    }),
     rule(&["segment"], &["top", "kind"], |g| when(g.has("click"), "with --click, which asks for nothing")),
     rule(&["segment"], RECIPE, |g| when(g.has("click"), "with --click, which asks for nothing")),
     rule(&["segment"], &["no_measure"], |g| when(g.has("all"), "with --all, which measures nothing")),

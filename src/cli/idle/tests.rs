@@ -185,6 +185,7 @@ const LINES: &[(&str, &[&str], &str)] = &[
     ("query s --phrases f {}", &["--relevancy raw"], "query s --phrases f --top 2 --kind part --views all --export o"),
     ("segment s lamp --out o.ply {}", &["--format spz", "--masks isat", "--views none", "--max-side 64"], ""),
     ("segment s lamp --out o.ply {}", &["--click-out 1,1", "--view 0", "--keep lamp", "--relevancy raw"], ""),
+    ("segment s lamp --out o.ply {}", &["--width 5", "--correct lid"], "segment s --click 1,1 --width 5 --correct lid"),
     (
         "segment s --click 1,1 --out o.ply {}",
         &["--top 2", "--kind part", "--by names"],
@@ -193,7 +194,7 @@ const LINES: &[(&str, &[&str], &str)] = &[
     ("segment s --click 1,1 --out o.ply {}", RECIPE, "segment s lamp --out o.ply --by names --top 2"),
     ("segment s --click 1,1 --keep x {}", &["--no-measure"], "segment s --click 1,1 --out o.ply --no-measure"),
     ("segment s --all --out o {}", &["--no-measure"], "segment s --all --out o --format spz --views none"),
-    ("segment s lamp {}", &["--keep x"], ""),
+    ("segment s lamp {}", &["--keep x", "--correct x"], ""),
     ("eval s {}", RECIPE, "eval s --masks m --by names"),
     ("eval s {}", &["--protocol masks", "--query lamp"], "eval s --masks m --protocol spin-nerf --query lamp"),
     ("eval s --depth {}", &["--decoder f", "--encoder e"], "eval s --masks m --decoder f --encoder e"),

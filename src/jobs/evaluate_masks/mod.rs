@@ -16,8 +16,8 @@ use crate::math::stats::mean;
 use crate::pipeline::observer::Silent;
 use crate::pipeline::semantics::code_map::CodeMap;
 use crate::pipeline::semantics::evaluation::{
-    AskedScene, Category, LabeledView, Unit, categories, fastlgs_ex, langsplat, limits, masks, means, multi_class,
-    part_recall, recipes, selection_3d, spin_nerf, strokes,
+    AskedScene, Category, LabeledPhoto, LabeledView, Unit, categories, fastlgs_ex, langsplat, limits, masks, means,
+    multi_class, part_recall, recipes, selection_3d, spin_nerf, strokes,
 };
 use crate::pipeline::semantics::lifting::segmenter::{FileMasks, Segmenter};
 use crate::pipeline::semantics::lifting::splat_tree::hierarchy::Hierarchy;
@@ -240,20 +240,13 @@ fn by_strokes(
     for photo in held {
         let categories = categories(&labels.segment(photo, *max_side_px, &mut Silent)?);
         let (name, camera) = (photo.name.clone(), photo.camera.limited_to(*max_side_px));
-        views.push(strokes::LabeledPhoto { name, camera, categories });
+        views.push(LabeledPhoto { name, camera, categories });
     }
     let cameras: Vec<Camera> = photos.iter().map(|p| p.camera.clone()).collect();
     let start = std::time::Instant::now();
     let hierarchy = Hierarchy::new(cloud, &cameras, settings, &mut Silent)?;
     let prepare_secs = start.elapsed().as_secs_f64();
-    let members = known.map(|map| {
-        |name: &str| {
-            let id = map.identities.called(name, LevelFilter::Auto).first().copied();
-            id.map_or_else(Vec::new, |id| map.members(id))
-        }
-    });
-    let members = members.as_ref().map(|m| m as strokes::Known<'_>);
-    let rows = strokes::rows(&hierarchy, cloud, settings, &views, members)?;
+    let rows = strokes::rows(&hierarchy, cloud, settings, &views, known)?;
     if rows.is_empty() {
         let text = "the labels name nothing that is large enough in two of the photos; give those of more photos";
         return Err(JobError::Protocol(text.into()));

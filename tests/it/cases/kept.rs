@@ -59,6 +59,27 @@ fn finding_objects_anew_keeps_what_was_named_and_says_so() {
 }
 
 #[test]
+fn a_click_corrects_what_has_a_name_and_tells_what_others_lose() {
+    let folder = folder();
+    let (scene, photos) = boxes(folder.path());
+    preprocess(&scene, &photos, &[]).ok();
+    let click = |name: &str| {
+        run(&[&"segment", &scene, &"--click", &"48,36", &"--width", &"4", &"--view", &"0", &"--correct", &name])
+    };
+    let before = map(&scene);
+    click("nothing of that name").fails_with(1);
+    assert_eq!(map(&scene).identity_of, before.identity_of, "the control");
+    let done = click("box 1").ok();
+    assert!(done.stdout.contains("corrected 'box 1'"), "{}", done.stdout);
+    let now = map(&scene);
+    assert_eq!(now.identities.len(), before.identities.len());
+    for name in ["box 0", "box 2"] {
+        let (had, has) = (own(&before, name).len(), own(&now, name).len());
+        assert!(has <= had && (has == had || done.stderr.contains(&format!("of '{name}'"))), "{}", done.stderr);
+    }
+}
+
+#[test]
 fn what_was_removed_is_not_found_again() {
     let folder = folder();
     let (scene, photos) = boxes(folder.path());

@@ -12,6 +12,7 @@ mod end_to_end_tests;
 pub(crate) mod fastlgs_ex;
 #[cfg(test)]
 mod hand_computed_tests;
+pub(crate) mod known_things;
 pub(crate) mod langsplat;
 pub(crate) mod limits;
 pub(crate) mod masks;
@@ -45,6 +46,13 @@ pub(crate) struct LabeledView<'a> {
     pub(crate) camera: &'a Camera,
     pub(crate) exact: &'a ViewMap,
     pub(crate) blended: &'a CodeMap,
+    pub(crate) categories: Vec<Category>,
+}
+
+/// A photo with its labels.
+pub(crate) struct LabeledPhoto {
+    pub(crate) name: String,
+    pub(crate) camera: Camera,
     pub(crate) categories: Vec<Category>,
 }
 

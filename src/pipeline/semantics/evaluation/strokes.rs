@@ -1,10 +1,11 @@
 //! `strokes`: a simulated user points at a thing in the view that shows most of it and corrects the selection there
 //! with a second and a third stroke; all other views are scored. `corrections`: a simulated user corrects the known
-//! Gaussians of a thing by three strokes, each in the view with most errors; all views are scored.
+//! Gaussians of a thing by three strokes, each in the view with most errors; all views are scored, and all other things.
 
-use std::collections::{BTreeMap, VecDeque};
+use std::collections::VecDeque;
 
-use super::Category;
+use super::LabeledPhoto;
+use super::known_things::{KnownThings, NamedThings, WorstOther};
 use crate::math::grid::{neighbors, regions};
 use crate::pipeline::semantics::lifting::splat_tree::hierarchy::Hierarchy;
 use crate::pipeline::semantics::lifting::splat_tree::marks::{Stroke, StrokeMarks};
@@ -12,7 +13,7 @@ use crate::pipeline::semantics::lifting::splat_tree::others::OtherIdentities;
 use crate::pipeline::semantics::query::timing::ms_since;
 use crate::pipeline::semantics::view_map::ViewMap;
 use crate::render::{DrawError, RenderSettings, Renderer};
-use crate::scene::{Camera, GaussianCloud, Identities, IdentityId, Level, Mask};
+use crate::scene::{GaussianCloud, Identities, IdentityId, Level, Mask, SemanticMap};
 
 /// Strokes for each thing.
 pub(crate) const STROKES: usize = 3;
@@ -22,13 +23,6 @@ const RADIUS_PX: usize = 3;
 const SEEN: f64 = 0.02;
 /// Least number of pixels of a thing for a test.
 const LEAST_PX: usize = 60;
-
-/// A photo with its labels.
-pub(crate) struct LabeledPhoto {
-    pub(crate) name: String,
-    pub(crate) camera: Camera,
-    pub(crate) categories: Vec<Category>,
-}
 
 /// A thing with the scores of its selection.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
@@ -43,10 +37,14 @@ pub(crate) struct StrokeRow {
     pub(crate) iou: [f64; STROKES + 1],
     /// Milliseconds from each stroke to the selected Gaussians.
     pub(crate) ms: [f64; STROKES],
+    /// Largest loss of another thing by each stroke; empty if none is known.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub(crate) others: Vec<WorstOther>,
+    /// Number of Gaussians that each stroke left to other identities, as it did not touch them.
+    pub(crate) left: [usize; STROKES],
+    /// True for each stroke that changed only what is along it.
+    pub(crate) along: [bool; STROKES],
 }
-
-/// Returns the known Gaussians of a name.
-pub(crate) type Known<'a> = &'a dyn Fn(&str) -> Vec<usize>;
 
 /// Selects every named thing of the views; with `known`, corrects the known Gaussians of its name.
 pub(crate) fn rows(
@@ -54,22 +52,26 @@ pub(crate) fn rows(
     cloud: &GaussianCloud,
     settings: &RenderSettings,
     views: &[LabeledPhoto],
-    known: Option<Known<'_>>,
+    known: Option<&SemanticMap>,
 ) -> Result<Vec<StrokeRow>, DrawError> {
-    let mut things: BTreeMap<&str, Vec<(usize, &Category)>> = BTreeMap::new();
+    let mut things = NamedThings::new();
     for (k, view) in views.iter().enumerate() {
         let large = view.categories.iter().filter(|c| c.mask.area() >= LEAST_PX);
         large.for_each(|c| things.entry(&c.name).or_default().push((k, c)));
     }
     let mut renderer = Renderer::new();
+    let mut watch = known.map(|map| KnownThings::new(map, (cloud, settings), (views, &things))).transpose()?;
     let mut rows = Vec::new();
-    for (name, seen) in things.into_iter().filter(|(_, seen)| seen.len() > 1) {
+    for (name, seen) in things.iter().filter(|(_, seen)| seen.len() > 1) {
         let mut draw = |selected: &[bool], k: usize| -> Result<Mask, DrawError> {
             let all = Identities::objects(1);
             let of: Vec<IdentityId> = selected.iter().map(|s| IdentityId::from(*s)).collect();
             Ok(ViewMap::render(&mut renderer, cloud, &of, &all, &views[k].camera, settings)?.mask(&all, 1))
         };
-        let from = known.map_or_else(Vec::new, |known| known(name));
+        watch.iter_mut().for_each(KnownThings::restart);
+        let own = watch.as_ref().and_then(|watch| watch.find(name));
+        let from = own.map_or_else(Vec::new, |(map, id)| map.members(id));
+        let others = own.map_or_else(OtherIdentities::default, |(map, id)| OtherIdentities::new(map, id));
         let (mut marks, mut selected) = (StrokeMarks::default(), vec![false; cloud.len()]);
         from.iter().for_each(|&i| selected[i] = true);
         let mut row: Option<StrokeRow> = None;
@@ -81,12 +83,15 @@ pub(crate) fn rows(
             };
             let worst = (0..seen.len()).rev().max_by_key(|at| wrong(*at)).unwrap_or(0);
             let row = row.get_or_insert_with(|| StrokeRow {
-                name: name.to_owned(),
+                name: (*name).to_owned(),
                 level: seen[0].1.level,
                 drawn_in: views[seen[worst].0].name.clone(),
                 views: seen.len() - usize::from(known.is_none()),
                 iou: [0.0; STROKES + 1],
                 ms: [0.0; STROKES],
+                others: known.map_or_else(Vec::new, |_| vec![WorstOther::default(); STROKES]),
+                left: [0; STROKES],
+                along: [false; STROKES],
             });
             // A selection is corrected where it was begun.
             let begun = seen.iter().position(|(view, _)| views[*view].name == row.drawn_in).unwrap_or(0);
@@ -99,11 +104,17 @@ pub(crate) fn rows(
             let start = std::time::Instant::now();
             let stroke = Stroke { camera: views[view].camera.clone(), pixels, is_plus };
             marks.add(&mut Renderer::new(), cloud, settings, &stroke)?;
-            selected = match known {
-                Some(_) => hierarchy.correct(&marks, &from, &OtherIdentities::default()).is_in,
-                None => hierarchy.select(&marks, &from).is_in,
+            let found = match known {
+                Some(_) => hierarchy.correct(&marks, &from, &others),
+                None => hierarchy.select(&marks, &from),
             };
+            selected = found.is_in;
             row.ms[k] = ms_since(start);
+            row.left[k] = found.effect.others.iter().filter(|c| c.is_left).map(|c| c.gaussians).sum();
+            row.along[k] = found.effect.is_along;
+            if let Some(watch) = &mut watch {
+                row.others[k] = watch.worst_other(name, &selected)?;
+            }
         }
         rows.extend(row);
     }

@@ -149,22 +149,32 @@ pub(crate) fn apply(map: &SemanticMap, cloud: &GaussianCloud, edit: &Edit) -> Re
 }
 
 fn reshape(map: &mut SemanticMap, id: IdentityId, gaussians: &[u32]) {
-    let inside = map.identities.descendants(id);
-    let whole = map.identities.get(id).map_or(NO_IDENTITY, |i| i.parent);
     let mut listed = vec![false; map.identity_of.len()];
     for &i in gaussians {
         if let Some(listed) = listed.get_mut(i as usize) {
             *listed = true;
         }
     }
-    for (i, is_listed) in listed.into_iter().enumerate() {
-        let has = inside.get(map.identity_of[i] as usize) == Some(&true);
-        // Gaussians of its parts keep their labels.
-        if has != is_listed {
-            let now = if is_listed { id } else { whole };
+    for (i, now) in reshaped(map, id, &listed).into_iter().enumerate() {
+        if map.identity_of[i] != now {
             (map.identity_of[i], map.codes[i]) = (now, map.identities.codes(now));
         }
     }
+}
+
+/// Returns the labels of all Gaussians once an identity has exactly the listed ones. Those of its parts keep theirs.
+pub(crate) fn reshaped(map: &SemanticMap, id: IdentityId, listed: &[bool]) -> Vec<IdentityId> {
+    let inside = map.identities.descendants(id);
+    let whole = map.identities.get(id).map_or(NO_IDENTITY, |i| i.parent);
+    let label = |(of, is_listed): (&IdentityId, &bool)| {
+        let has = inside.get(*of as usize) == Some(&true);
+        match (has, *is_listed) {
+            (false, true) => id,
+            (true, false) => whole,
+            _ => *of,
+        }
+    };
+    map.identity_of.iter().zip(listed).map(label).collect()
 }
 
 /// Adds an identity of these Gaussians, whatever their labels were; returns its number.

@@ -4,8 +4,9 @@ use std::collections::BTreeMap;
 
 use glam::{DVec2, DVec3};
 
-use crate::math::lanes::Lane;
-use crate::render::{ContributionSink, RenderError, RenderSettings, Renderer, TILE_PX};
+use super::band::LineBand;
+use super::seen::{ViewPart, pointed_at};
+use crate::render::{RenderError, RenderSettings, Renderer};
 use crate::scene::{Camera, GaussianCloud, Mask};
 
 /// Longer side of the view in which strokes are drawn, px.
@@ -17,11 +18,9 @@ const CLICK: f64 = 16.0;
 /// Least square of a line's length, in areas of the line; shorter strokes are clicks.
 const LINE: f64 = 3.0;
 
-/// Pixels around a stroke that are rendered with it.
+/// Pixels around a stroke that are rendered with it, and their number for a wide line, in widths of the line.
 const ROOM_PX: usize = 32;
-
-/// Share of a pixel's weight that counts as the target, from its largest contributor on.
-const POINTED_AT: f32 = 0.6;
+const ROOM: f64 = 3.0;
 
 /// Marked pixels of a view, as belonging to the target or not.
 #[derive(Clone, Debug, PartialEq)]
@@ -56,6 +55,8 @@ pub(super) struct StrokeMark {
     pub(super) is_click: bool,
     /// Square of its length at the depth of its Gaussians, at least a multiple of its area: square units.
     pub(super) size: f64,
+    /// Surroundings of a line, if there is room for them.
+    pub(super) band: Option<LineBand>,
 }
 
 impl StrokeMarks {
@@ -78,41 +79,23 @@ impl StrokeMarks {
         stroke: &Stroke,
     ) -> Result<(), RenderError> {
         let Some(near) = stroke.pixels.bounds() else { return Ok(()) };
-        // Far from the stroke, nothing need be rendered.
-        let from = [near.x.start, near.y.start].map(|v| v.saturating_sub(ROOM_PX));
-        let to = |end: usize, most: u32| (end + ROOM_PX).min(most as usize);
-        let (right, bottom) = (to(near.x.end, stroke.camera.width_px), to(near.y.end, stroke.camera.height_px));
-        let (width, height) = (right - from[0], bottom - from[1]);
-        let camera = &Camera {
-            width_px: width as u32,
-            height_px: height as u32,
-            principal_px: stroke.camera.principal_px - DVec2::new(from[0] as f64, from[1] as f64),
-            ..stroke.camera.clone()
-        };
-        let row = || Row { pixels: &stroke.pixels, from, width, found: Vec::new() };
-        let mut rows: Vec<Row<'_>> = (0..height.div_ceil(TILE_PX)).map(|_| row()).collect();
-        renderer.contributions(cloud, camera, settings, &mut rows)?;
-        let mut by_pixel: BTreeMap<u32, Vec<(f32, u32)>> = BTreeMap::new();
-        for (pixel, gaussian, weight) in rows.into_iter().flat_map(|r| r.found) {
-            by_pixel.entry(pixel).or_default().push((weight, gaussian));
-        }
-        let mut weights: BTreeMap<u32, f32> = BTreeMap::new();
-        for mut found in by_pixel.into_values() {
-            found.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
-            let enough = POINTED_AT * found.iter().map(|f| f.0).sum::<f32>();
-            let mut sum = 0.0;
-            for (weight, gaussian) in found {
-                *weights.entry(gaussian).or_default() += weight;
-                sum += weight;
-                if sum >= enough {
-                    break;
-                }
-            }
-        }
         let (length2, area) = (length_px2(&stroke.pixels), stroke.pixels.area() as f64);
         let is_click = length2 < LINE * area;
-        let size = length2.max(CLICK * area) * units_per_px(cloud, &stroke.camera, &weights).powi(2);
-        self.strokes.push(StrokeMark { weights, is_plus: stroke.is_plus, is_click, size });
+        // Far from the stroke, nothing need be rendered.
+        let room_px = if is_click { ROOM_PX } else { ROOM_PX.max((ROOM * area / length2.sqrt()) as usize) };
+        let part = ViewPart::around(&near, room_px, &stroke.camera);
+        let is_in = part.cut(&stroke.pixels);
+        let weights = pointed_at(part.weights(renderer, cloud, settings, &|i| is_in[i])?.into_iter());
+        let units_per_px = units_per_px(cloud, &stroke.camera, &weights);
+        let size = length2.max(CLICK * area) * units_per_px.powi(2);
+        let band = match median_radius(cloud, &weights).filter(|_| !is_click) {
+            Some(radius) => {
+                let (place, reach) = ((&part, is_in.as_slice()), (radius / units_per_px, room_px));
+                LineBand::new(renderer, cloud, settings, place, reach)?
+            }
+            None => None,
+        };
+        self.strokes.push(StrokeMark { weights, is_plus: stroke.is_plus, is_click, size, band });
         Ok(())
     }
 }
@@ -130,36 +113,31 @@ fn length_px2(pixels: &Mask) -> f64 {
 /// Size of a pixel at the median depth, by weight, of these Gaussians.
 fn units_per_px(cloud: &GaussianCloud, camera: &Camera, weights: &BTreeMap<u32, f32>) -> f64 {
     let axis = camera.world_from_camera * DVec3::Z;
-    let depth = |i: &u32| (cloud.world_position(*i as usize) - camera.center).dot(axis);
-    let mut depths: Vec<(f64, f32)> = weights.iter().map(|(i, w)| (depth(i), *w)).collect();
-    depths.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let half = 0.5 * depths.iter().map(|d| d.1).sum::<f32>();
+    let depth = |i: usize| (cloud.world_position(i) - camera.center).dot(axis);
+    median(weights, depth).map_or(1.0, |depth| depth / (camera.focal_px.x * camera.focal_px.y).sqrt())
+}
+
+/// Median, by weight, of the radii of these Gaussians: of a disk its radius, of a needle its thickness.
+fn median_radius(cloud: &GaussianCloud, weights: &BTreeMap<u32, f32>) -> Option<f64> {
+    let radius = |i: usize| {
+        let mut scales = cloud.log_scales[i];
+        scales.sort_by(f32::total_cmp);
+        f64::from(scales[1]).exp()
+    };
+    median(weights, radius)
+}
+
+/// Median, by weight, of a value of these Gaussians.
+fn median(weights: &BTreeMap<u32, f32>, value: impl Fn(usize) -> f64) -> Option<f64> {
+    let mut values: Vec<(f64, f32)> = weights.iter().map(|(i, w)| (value(*i as usize), *w)).collect();
+    values.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let half = 0.5 * values.iter().map(|v| v.1).sum::<f32>();
     let mut sum = 0.0;
-    let reached = depths.iter().find(|(_, w)| {
+    let reached = values.iter().find(|(_, w)| {
         sum += w;
         sum >= half
     });
-    reached.map_or(1.0, |(depth, _)| depth / (camera.focal_px.x * camera.focal_px.y).sqrt())
-}
-
-/// Collects the contributors of the marked pixels in one row of tiles.
-struct Row<'a> {
-    pixels: &'a Mask,
-    /// The corner of the rendered part in the view.
-    from: [usize; 2],
-    width: usize,
-    found: Vec<(u32, u32, f32)>,
-}
-
-impl ContributionSink<f32> for Row<'_> {
-    fn add(&mut self, gaussian: u32, x: usize, y: usize, weights: &Lane<f32>) {
-        for (k, &weight) in weights.iter().enumerate().take(self.width - x).filter(|(_, w)| **w > 0.0) {
-            let pixel = (y + self.from[1]) * self.pixels.width_px() + x + k + self.from[0];
-            if self.pixels.contains(pixel) {
-                self.found.push((pixel as u32, gaussian, weight));
-            }
-        }
-    }
+    reached.map(|(value, _)| *value)
 }
 
 #[cfg(test)]
@@ -174,5 +152,12 @@ mod tests {
         assert_eq!([5.0, 4.0, 32.0].map(side), [512; 3], "the usual width, and wider ones");
         assert_eq!([2.0, 1.0, 0.5].map(side), [1000, 2000, 2000], "as large as it is at most");
         assert_eq!(Stroke::view(&cameras()[0], 0.5), cameras()[0]);
+    }
+
+    #[test]
+    fn half_of_the_weight_is_at_most_the_median() {
+        let weights: BTreeMap<u32, f32> = [(0, 1.0), (1, 1.0), (2, 5.0)].into();
+        assert_eq!(median(&weights, |i| [1.0, 9.0, 4.0][i]), Some(4.0));
+        assert_eq!(median(&BTreeMap::new(), |_| 1.0), None);
     }
 }

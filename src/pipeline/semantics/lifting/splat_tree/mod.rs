@@ -10,12 +10,14 @@
 //! Labels minimize a cost over the tree: votes of masks weigh more than photo edges (`tracker/complete.rs`). A click
 //! or stroke renders only the Gaussians near it.
 
+mod band;
 mod cheapest;
 pub(crate) mod hierarchy;
 mod labels;
 mod leaves;
 pub(crate) mod marks;
 pub(crate) mod others;
+mod seen;
 pub(crate) mod selection;
 pub(crate) mod stored;
 pub(crate) mod surface;

@@ -17,14 +17,15 @@ impl ToldEffect {
     /// The effect with identities by their `name`; `None` if there is nothing to tell.
     pub(super) fn new(effect: &MarkEffect, name: &dyn Fn(IdentityId) -> String) -> Option<Self> {
         let told = |text: &String| format!("{}.", capital(text));
-        let [left, taken] = effect.sentences(name).map(|text| text.as_ref().map(told));
+        let [left, taken, along] = effect.sentences(name).map(|text| text.as_ref().map(told));
         let is_warning = effect.others.iter().any(|other| !other.is_left && other.is_large());
         let limited = effect.is_limited.then(|| {
             let all = "The click could have changed much more of what is known. A line changes more.";
             ("Only near the click".to_owned(), all.to_owned())
         });
+        let along = along.map(|all| ("Only along the line".to_owned(), all));
         let whole = |text: Option<String>| text.map(|text| (text.clone(), text));
-        let all = [whole(left), limited, whole(taken)];
+        let all = [whole(left), limited, along, whole(taken)];
         let mut each: Vec<(String, String)> = all.into_iter().flatten().collect();
         if is_warning {
             each.rotate_right(1);
@@ -45,7 +46,7 @@ mod tests {
         let name = |id: IdentityId| ["", "mouth", "cup"][id as usize].to_owned();
         let change = |id, share, is_left| OtherChange { id, gaussians: 20, share, is_left };
         let told = |is_limited, others: &[OtherChange]| {
-            ToldEffect::new(&MarkEffect { is_limited, others: others.to_vec() }, &name)
+            ToldEffect::new(&MarkEffect { is_limited, others: others.to_vec(), ..MarkEffect::default() }, &name)
         };
         let left = "Left 20 Gaussians of 'mouth' as they were: the stroke does not touch it.";
         let both = told(true, &[change(1, 0.5, true), change(2, 0.01, false)]).expect("told");
@@ -57,6 +58,8 @@ mod tests {
         assert_eq!((large.line.as_str(), large.is_warning), ("Took 20 Gaussians of 'cup' (20 %).", true));
         assert!(large.all.ends_with(left), "{}", large.all);
         assert_eq!(told(true, &[]).map(|told| told.line).as_deref(), Some("Only near the click"));
+        let along = ToldEffect::new(&MarkEffect { is_along: true, ..MarkEffect::default() }, &name).expect("told");
+        assert!(along.line == "Only along the line" && along.all.starts_with("Changed only what is along the line:"));
         // The control: a stroke that changes nothing else.
         assert_eq!(told(false, &[]), None);
     }

@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use super::band::AS_WIDE;
 use super::hierarchy::Hierarchy;
 use super::marks::{StrokeMark, StrokeMarks};
 use super::others::{OtherChange, OtherIdentities, left_text, taken_text};
@@ -35,15 +36,19 @@ pub(crate) struct MarkedSplats {
 pub(crate) struct MarkEffect {
     /// True if it is a click that was kept from changing more of something known.
     pub(crate) is_limited: bool,
+    /// True if it is a line that changed only what is along it.
+    pub(crate) is_along: bool,
     /// Changes of all other identities.
     pub(crate) others: Vec<OtherChange>,
 }
 
 impl MarkEffect {
-    /// Sentences on what the stroke left to others and took from them, by their `name`: "left 2 Gaussians of 'mouth'
-    /// as they were".
-    pub(crate) fn sentences(&self, name: &dyn Fn(IdentityId) -> String) -> [Option<String>; 2] {
-        [left_text(&self.others, name), taken_text(&self.others, name)]
+    /// Sentences on what the stroke left to others, took from them, and took of a thin surface, by their `name`: "left
+    /// 2 Gaussians of 'mouth' as they were".
+    pub(crate) fn sentences(&self, name: &dyn Fn(IdentityId) -> String) -> [Option<String>; 3] {
+        let along = "changed only what is along the line: the surface is hardly wider there";
+        let along = self.is_along.then(|| along.to_owned());
+        [left_text(&self.others, name), taken_text(&self.others, name), along]
     }
 }
 
@@ -93,6 +98,8 @@ struct MarkedLabels<'a> {
     /// Labels of the leaves, and of the Gaussians.
     now: Vec<bool>,
     is_in: Vec<bool>,
+    /// Labels of Gaussians along lines, whatever their leaves have.
+    along: BTreeMap<u32, bool>,
 }
 
 impl<'a> MarkedLabels<'a> {
@@ -118,8 +125,8 @@ impl<'a> MarkedLabels<'a> {
             }
         }
         let (marked, now, is_in) = (vec![[0.0; 2]; tree.leaves], before.clone(), given.clone());
-        let is_given = !from.is_empty();
-        let mut labels = Self { tree, given, before, is_given, known: 0.0, alone, marked, now, is_in };
+        let (is_given, along) = (!from.is_empty(), BTreeMap::new());
+        let mut labels = Self { tree, given, before, is_given, known: 0.0, alone, marked, now, is_in, along };
         labels.known = labels.area(&|leaf| labels.before[leaf]);
         labels
     }
@@ -137,6 +144,7 @@ impl<'a> MarkedLabels<'a> {
         by_click: &[f64],
         others: &OtherIdentities,
     ) -> MarkEffect {
+        let unmarked = stroke.band.is_some().then(|| self.marked.clone());
         self.mark(stroke);
         let change = match stroke {
             StrokeMark { is_click, .. } if self.is_given => [if *is_click { by_click[0] } else { KNOWN }; 2],
@@ -153,10 +161,58 @@ impl<'a> MarkedLabels<'a> {
             }
             (nodes, is_limited) = (self.cheapest(stroke, [*dearer; 2]), true);
         }
-        let mut flips = self.by_leaves(nodes);
+        let along = self.along(stroke, &nodes);
+        let mut flips = match (&along, unmarked) {
+            (Some(along), Some(unmarked)) => {
+                self.marked = unmarked;
+                let flips = along.iter().map(|gaussian| (*gaussian, stroke.is_plus));
+                flips.filter(|(gaussian, is_in)| self.is_in[*gaussian as usize] != *is_in).collect()
+            }
+            _ => self.by_leaves(nodes, stroke),
+        };
         let others = others.spare(&mut flips, &stroke.weights, &self.tree.area);
         flips.iter().for_each(|&(gaussian, is_in)| self.is_in[gaussian as usize] = is_in);
-        MarkEffect { is_limited, others }
+        // Those that were left to others are not marked.
+        let follows = |gaussian: &&u32| self.is_in[**gaussian as usize] == stroke.is_plus;
+        self.along.extend(along.iter().flatten().filter(follows).map(|gaussian| (*gaussian, stroke.is_plus)));
+        MarkEffect { is_limited, is_along: along.is_some(), others }
+    }
+
+    /// Gaussians along a line, if they are to change in place of the leaves: the tree knows regions only, and all of a
+    /// thin one would go with a line on it, or with a part of it.
+    ///
+    /// That is so where two things hold. The surface that is to change, as far as it belongs together under the line or
+    /// up to a known border, is about as wide as the line. And the leaves to be changed are much more than the line is
+    /// about: of a given selection more than about the Gaussians along the line, else more than a stroke's size. So
+    /// lines on broad surfaces, and on thin ones that end with them, change leaves.
+    fn along(&self, stroke: &StrokeMark, nodes: &[bool]) -> Option<Vec<u32>> {
+        let band = stroke.band.as_ref()?;
+        let changed = self.area(&|leaf| nodes[leaf] != self.now[leaf]);
+        if !self.is_given && changed <= stroke.size {
+            return None;
+        }
+        let surface = self.surface(stroke);
+        let is_on = |gaussian: &&u32| surface[self.tree.leaf[**gaussian as usize] as usize];
+        let on_surface = band.around.iter().filter(|(gaussian, _)| is_on(gaussian));
+        let seen_px: f64 = on_surface.map(|(_, weight)| f64::from(*weight)).sum();
+        let along: Vec<u32> = band.along.iter().filter(is_on).copied().collect();
+        let area: f64 = along.iter().map(|gaussian| self.tree.area[*gaussian as usize]).sum();
+        let is_thin = seen_px <= AS_WIDE * band.area_px;
+        (is_thin && !along.is_empty() && (!self.is_given || changed > AS_WIDE * area)).then_some(along)
+    }
+
+    /// Leaves that belong together under a stroke: those that it would select as the first one, were it only where it
+    /// is to change something.
+    fn surface(&self, stroke: &StrokeMark) -> Vec<bool> {
+        let (mut weights, _) = self.under(stroke);
+        weights.retain(|leaf, _| self.now[*leaf as usize] != stroke.is_plus);
+        let all: f64 = weights.values().sum();
+        let by_area = FIRST / stroke.size.max(f64::MIN_POSITIVE);
+        let cost = |leaf: usize| {
+            let against = weights.get(&(leaf as u32)).map_or(0.0, |weight| MARK * weight / all);
+            [against, by_area * self.tree.tree.nodes[leaf].area]
+        };
+        self.tree.cheapest(&cost, &self.alone)
     }
 
     /// Weights of the leaves under a stroke, and their sum.
@@ -193,13 +249,16 @@ impl<'a> MarkedLabels<'a> {
     }
 
     /// Takes new labels of the leaves over; returns the Gaussians that change by that, with their new labels.
-    fn by_leaves(&mut self, mut nodes: Vec<bool>) -> Vec<(u32, bool)> {
+    fn by_leaves(&mut self, mut nodes: Vec<bool>, stroke: &StrokeMark) -> Vec<(u32, bool)> {
         nodes.truncate(self.tree.leaves);
         self.now = nodes;
+        // Of two opposite marks, the later one counts.
+        self.along.retain(|gaussian, is_in| *is_in == stroke.is_plus || !stroke.weights.contains_key(gaussian));
         let label = |gaussian: usize| {
             let leaf = self.tree.leaf[gaussian] as usize;
             // Gaussians in leaves without a change are as they were given.
-            if self.now[leaf] != self.before[leaf] { self.now[leaf] } else { self.given[gaussian] }
+            let by_leaf = if self.now[leaf] != self.before[leaf] { self.now[leaf] } else { self.given[gaussian] };
+            self.along.get(&(gaussian as u32)).copied().unwrap_or(by_leaf)
         };
         let all = (0..self.is_in.len()).map(|gaussian| (gaussian as u32, label(gaussian)));
         all.filter(|(gaussian, is_in)| self.is_in[*gaussian as usize] != *is_in).collect()

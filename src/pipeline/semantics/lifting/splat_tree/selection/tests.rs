@@ -2,6 +2,7 @@
 
 use glam::DVec3;
 
+use super::super::band::LineBand;
 use super::super::hierarchy::tests::{H, W, cameras, hierarchy, sheet};
 use super::super::marks::Stroke;
 use super::*;
@@ -57,7 +58,19 @@ fn made(sizes: &[usize], merges: &[([u32; 2], f64)]) -> Hierarchy {
 /// A click on these Gaussians that adds.
 fn click(on: &[u32]) -> StrokeMark {
     let weights = on.iter().map(|i| (*i, 1.0)).collect();
-    StrokeMark { weights, is_plus: true, is_click: true, size: 100.0 }
+    StrokeMark { weights, is_plus: true, is_click: true, size: 100.0, band: None }
+}
+
+/// A line over the first `n` Gaussians, with `beside` others that are seen around it, and one along it of another leaf.
+fn line_on(n: u32, beside: u32, is_plus: bool, another: u32) -> StrokeMark {
+    let around = (0..n + beside).chain([another]).map(|i| (i, 1.0)).collect();
+    let band = LineBand { along: (0..n).chain([another]).collect(), area_px: f64::from(n), around };
+    StrokeMark { weights: (0..n).map(|i| (i, 1.0)).collect(), is_plus, is_click: false, size: 100.0, band: Some(band) }
+}
+
+/// The same without a look around it: leaves decide.
+fn by_leaves(line: &StrokeMark) -> StrokeMark {
+    StrokeMark { band: None, ..line.clone() }
 }
 
 /// Counts the selected Gaussians of each of the three.
@@ -183,4 +196,61 @@ fn what_a_click_does_not_touch_stays_with_its_identity() {
     assert_eq!(correct(vec![click(&[10, 11]), click(&[12])], &others), ([10, 10, 0], mouth(true)));
     // What is taken is no change any more.
     assert_eq!(correct(vec![click(&[10, 20]), click(&[11])], &others), ([10; 3], Vec::new()));
+}
+
+#[test]
+fn a_line_on_a_thin_part_corrects_what_is_along_it() {
+    // A known strip of one leaf, and all around it.
+    let tree = made(&[16, 40], &[([0, 1], 5.0)]);
+    let from: Vec<usize> = (0..16).collect();
+    let correct = |line: StrokeMark| {
+        let found = tree.correct(&StrokeMarks { strokes: vec![line] }, &from, &OtherIdentities::default());
+        let these: Vec<usize> = (0..56).filter(|i| found.is_in[*i]).collect();
+        (these, found.effect.is_along)
+    };
+    let thin = line_on(6, 4, false, 20);
+    // The control: the leaf goes as a whole.
+    assert_eq!(correct(by_leaves(&thin)), (Vec::new(), false));
+    assert_eq!(correct(thin), ((6..16).collect::<Vec<_>>(), true));
+    // Where the strip is wider than the line, and where the line covers most of it, leaves decide as before.
+    for line in [line_on(6, 7, false, 20), line_on(8, 4, false, 20)] {
+        assert_eq!(correct(line), (Vec::new(), false));
+    }
+    assert_eq!(correct(line_on(6, 4, true, 20)), (from.clone(), false), "nothing is missing there");
+}
+
+#[test]
+fn a_line_on_a_stick_does_not_take_the_disk_at_its_end() {
+    // A stick and a disk that look the same, and something else.
+    let tree = made(&[8, 400, 100], &[([0, 1], 0.1), ([3, 2], 8.0)]);
+    let select = |strokes: &[StrokeMark]| {
+        let found = tree.select(&StrokeMarks { strokes: strokes.to_vec() }, &[]);
+        let count = |range: std::ops::Range<usize>| found.is_in[range].iter().filter(|s| **s).count();
+        ([count(0..4), count(4..8), count(8..408), count(408..508)], found.effect.is_along)
+    };
+    let stick = line_on(4, 2, true, 450);
+    assert_eq!(select(&[by_leaves(&stick)]), ([4, 4, 400, 0], false), "the control");
+    assert_eq!(select(std::slice::from_ref(&stick)), ([4, 0, 0, 0], true));
+    // On the disk, the line selects all of it.
+    assert_eq!(select(&[line_on(4, 6, true, 450)]), ([4, 4, 400, 0], false));
+    // Later marks leave it alone, unless they are about it.
+    assert_eq!(select(&[stick.clone(), click(&[450])]), ([4, 0, 0, 100], false));
+    assert_eq!(select(&[stick.clone(), StrokeMark { is_plus: false, ..click(&[2]) }]).0, [3, 0, 0, 0]);
+    let mut all = StrokeMarks { strokes: vec![stick.clone(), click(&[450])] };
+    all.remove_last();
+    assert_eq!(tree.select(&all, &[]), tree.select(&StrokeMarks { strokes: vec![stick] }, &[]));
+}
+
+#[test]
+fn lines_on_broad_surfaces_select_as_without_a_look_around_them() {
+    let (cloud, whose) = sheet();
+    let tree = hierarchy(&cloud);
+    let upper: Vec<usize> = (0..whose.len()).filter(|i| whose[*i] == 2 || whose[*i] == 0 && i / 32 < 9).collect();
+    let lower = [line([-0.6, 0.6], [0.0, 0.6], true), line([0.6, -0.2], [0.6, 0.5], true)];
+    for (strokes, from) in [(&lower[..], &[][..]), (&lower[..1], &[][..]), (&lower[..], &upper[..])] {
+        let looked = marks(&cloud, strokes);
+        assert!(looked.strokes.iter().all(|s| s.band.is_some() && !s.is_click));
+        let plain = StrokeMarks { strokes: looked.strokes.iter().map(by_leaves).collect() };
+        assert_eq!(tree.select(&looked, from), tree.select(&plain, from));
+    }
 }
