@@ -91,8 +91,8 @@ fn summary(summary: &ProtocolSummary) -> String {
             let along = rows.iter().flat_map(|r| r.along).filter(|is| *is).count();
             let [gaussians, left] = [*gaussians, left].map(|n| count(n as u64));
             format!(
-                "{gaussians} Gaussians, made ready in {prepare_secs:.1} s; strokes left {left} untouched ones to other \
-                 things, and {along} changed only what is along them\n{table}"
+                "{gaussians} Gaussians, made ready in {prepare_secs:.1} s; {left} of things that no stroke touched stay \
+                 with these, and {along} lines change only what is along them\n{table}"
             )
         }
         ProtocolSummary::Recipes { absent, rows } => {
@@ -121,7 +121,7 @@ fn strokes(rows: &[StrokeRow]) -> Vec<Vec<String>> {
     let mut sorted: Vec<&StrokeRow> = rows.iter().collect();
     sorted.sort_by(|a, b| a.iou[STROKES].total_cmp(&b.iou[STROKES]));
     let head = ["", "level", "drawn in", "before", "1 stroke", "2", "3", "ms"];
-    let others = ["others: worst change by 1", "2", "3", "of"];
+    let others = ["worst other by 1", "by 2", "by 3", "which"];
     let has_others = rows.iter().any(|r| !r.others.is_empty());
     let mut table =
         vec![head.into_iter().chain(others.into_iter().filter(|_| has_others)).map(str::to_owned).collect()];
@@ -200,7 +200,7 @@ mod tests {
         let ear = row("ear", vec![worst("mouth", -0.5), worst("", 0.0), worst("", 0.0)]);
         let table = strokes(&[mouth, ear]);
         let others = |k: usize| table[k][8..].to_vec();
-        assert_eq!(others(0), ["others: worst change by 1", "2", "3", "of"]);
+        assert_eq!(others(0), ["worst other by 1", "by 2", "by 3", "which"]);
         assert_eq!(others(1), ["0.000", "-0.250", "-0.125", "face"]);
         assert_eq!(others(4), ["-0.500", "-0.250", "-0.125", "mouth"], "the worst of all parts");
         assert!(others(3).is_empty(), "there are no objects");

@@ -92,7 +92,7 @@ pub(crate) fn run(
             return Err(CliError::failed(format!("{},{} lies outside the view, which has {size}", at[0], at[1])));
         }
         let (w, h) = (camera.width_px as usize, camera.height_px as usize);
-        let radius = (scale * radius_px).max(1.0);
+        let radius = (scale * radius_px).max(std::f32::consts::FRAC_1_SQRT_2);
         let near = |i: usize| {
             let [dx, dy] = [(i % w) as f32 + 0.5 - scale * at[0], (i / w) as f32 + 0.5 - scale * at[1]];
             dx.hypot(dy) <= radius
@@ -112,7 +112,13 @@ pub(crate) fn run(
     // Clears the progress bar before the result is printed.
     drop(console);
     let selected = selected.filter(|s| !s.gaussians.is_empty());
-    let selected = selected.ok_or_else(|| CliError::failed("nothing is at the places that were clicked on"))?;
+    let nothing = || match purpose {
+        SelectFor::New(_) => CliError::failed("nothing is at the places that were clicked on"),
+        SelectFor::Extent(id) => {
+            CliError::failed(format!("nothing would be left of '{}'", map.identities.full_name(id)))
+        }
+    };
+    let selected = selected.ok_or_else(nothing)?;
     let mut lines = Vec::new();
     let [count, all] = [selected.gaussians.len(), scene.cloud.len()].map(|n| format::count(n as u64));
     let count = format!("{count} of {all} Gaussians");
@@ -136,7 +142,7 @@ pub(crate) fn run(
         let name = new.identities.full_name(id);
         lines.push(format!("{done} '{name}': {count}"));
         let emptied = edit::emptied(&map, &new);
-        lines.extend(emptied.iter().map(|emptied| format!("{name} took all Gaussians of {emptied}")));
+        lines.extend(emptied.iter().map(|emptied| format!("left without Gaussians: '{emptied}'")));
     }
     output::print(&lines.join("\n"))
 }

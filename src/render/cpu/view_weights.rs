@@ -106,6 +106,22 @@ mod tests {
         rows
     }
 
+    /// Asserts that a kept view gives every weight of the drawn one. Drawing ends a tile at the splat that makes it
+    /// opaque, or some splats later: what a kept view gives beyond that is what light is left there.
+    fn assert_alike(kept: &[Calls], drawn: &[Calls]) {
+        let most = 2.0 * crate::render::TRANSMITTANCE_MIN as f32;
+        assert_eq!(kept.len(), drawn.len());
+        for (kept, drawn) in kept.iter().zip(drawn) {
+            let mut left = drawn.0.iter().peekable();
+            for call in &kept.0 {
+                if left.next_if_eq(&call).is_none() {
+                    assert!(call.3.iter().all(|weight| *weight < most), "{call:?}");
+                }
+            }
+            assert_eq!(left.next(), None, "a weight is missing");
+        }
+    }
+
     /// A cloud of 5,000 in three layers, of which the first hides much of the others.
     fn cloud() -> GaussianCloud {
         let mut random = 11_u32;
@@ -133,7 +149,7 @@ mod tests {
         // The renderer draws something else meanwhile.
         let other = calls(&mut ViewWeights::drawn(&mut renderer, &cloud, &self::camera(0.2), &settings, false));
         assert_ne!(other, drawn, "the control, of another camera");
-        assert_eq!(calls(&mut ViewWeights::kept(&kept, &cloud, &camera)), drawn);
+        assert_alike(&calls(&mut ViewWeights::kept(&kept, &cloud, &camera)), &drawn);
         assert_eq!(kept.size_px(), [75, 52]);
         // Less than all splats in all of their tiles: what is hidden was left out.
         let mut seen: Vec<u32> = drawn.iter().flat_map(|row| &row.0).map(|call| call.0).collect();
@@ -162,7 +178,7 @@ mod tests {
             let mut view = ViewWeights::drawn(&mut renderer, &cloud, &camera, &settings, true).noting();
             assert_eq!(calls(&mut view), drawn, "surfels: {surfels}");
             let kept = view.keep().expect("kept");
-            assert_eq!(calls(&mut ViewWeights::kept(&kept, &cloud, &camera)), drawn, "surfels: {surfels}");
+            assert_alike(&calls(&mut ViewWeights::kept(&kept, &cloud, &camera)), &drawn);
         }
         // The control: a view that is not the last frame is not ready.
         renderer.render(&cloud, Features::NONE, &self::camera(0.2), &RenderSettings::default()).expect("drawn");

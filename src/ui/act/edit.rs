@@ -34,7 +34,8 @@ pub(in crate::ui) fn segment(app: &mut App, of: Option<IdentityId>) {
 /// Makes the lines of the selection tool, or its brush and ball, wider or narrower.
 pub(in crate::ui) fn widen_line(app: &mut App, is_wider: bool) {
     if !app.viewport.widen_line(is_wider) {
-        app.state.toast(Tone::Info, "Nothing is being selected: a new object or a correction has lines.");
+        app.state
+            .toast(Tone::Info, "Start a new object or a correction first; these keys change the width of its lines.");
     }
 }
 

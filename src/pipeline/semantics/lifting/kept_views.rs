@@ -1,5 +1,5 @@
 //! Views of the photos that are weighed again and again, kept within a budget of memory. Views beyond it are drawn anew,
-//! with the same result.
+//! with the same weights but for a last ten-thousandth of the light, which drawing may leave out.
 
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering::Relaxed};

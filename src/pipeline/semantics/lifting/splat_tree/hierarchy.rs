@@ -7,6 +7,7 @@ use crate::pipeline::semantics::lifting::error::FindError;
 use crate::pipeline::semantics::lifting::nearest::nearest;
 use crate::pipeline::semantics::lifting::regions::segment::unlike;
 use crate::pipeline::semantics::lifting::regions::tree::{Piece, Tree, grow};
+use crate::pipeline::semantics::lifting::renderers::Renderers;
 use crate::render::RenderSettings;
 use crate::scene::{Camera, GaussianCloud};
 
@@ -29,7 +30,9 @@ impl Hierarchy {
         settings: &RenderSettings,
         observer: &mut dyn Observer,
     ) -> Result<Self, FindError> {
-        Ok(Self::of(&SplatSurface::new(cloud, &nearest(cloud, NEIGHBORS), cameras, settings, observer)?))
+        let near = nearest(cloud, NEIGHBORS);
+        let mut renderers = Renderers::new(cloud.len());
+        Ok(Self::of(&SplatSurface::new(&mut renderers, cloud, &near, cameras, settings, observer)?))
     }
 
     /// Builds the tree of a surface.

@@ -65,7 +65,8 @@ impl OtherIdentities {
     }
 
     /// Takes the flips away by which an identity would lose more than a few percent, though none of its Gaussians is
-    /// among the `touched`. Returns the changes of all others, the largest share first.
+    /// among the `touched`. Returns the changes of all others, the largest share first, and the Gaussians that are left
+    /// with their labels.
     ///
     /// A flip is a Gaussian with its new label, `area` the visible area of each Gaussian.
     pub(super) fn spare(
@@ -73,7 +74,7 @@ impl OtherIdentities {
         flips: &mut Vec<(u32, bool)>,
         touched: &BTreeMap<u32, f32>,
         area: &[f64],
-    ) -> Vec<OtherChange> {
+    ) -> (Vec<OtherChange>, Vec<(u32, bool)>) {
         let mut lost: BTreeMap<IdentityId, (usize, f64)> = BTreeMap::new();
         for flip in flips.iter() {
             if let Some(id) = self.loser(*flip) {
@@ -82,7 +83,7 @@ impl OtherIdentities {
             }
         }
         if lost.is_empty() {
-            return Vec::new();
+            return (Vec::new(), Vec::new());
         }
         let mut whole: BTreeMap<IdentityId, f64> = lost.keys().map(|id| (*id, 0.0)).collect();
         for (id, area) in self.of.iter().zip(area) {
@@ -98,9 +99,10 @@ impl OtherIdentities {
         };
         let mut changes: Vec<OtherChange> = lost.into_iter().map(change).collect();
         let left: BTreeSet<IdentityId> = changes.iter().filter(|c| c.is_left).map(|c| c.id).collect();
-        flips.retain(|flip| self.loser(*flip).is_none_or(|id| !left.contains(&id)));
+        let is_left = |flip: &mut (u32, bool)| self.loser(*flip).is_some_and(|id| left.contains(&id));
+        let stay = flips.extract_if(.., is_left).map(|(gaussian, is_in)| (gaussian, !is_in)).collect();
         changes.sort_by(|a, b| b.share.total_cmp(&a.share).then(a.id.cmp(&b.id)));
-        changes
+        (changes, stay)
     }
 }
 
@@ -125,7 +127,7 @@ pub(super) fn left_text(changes: &[OtherChange], name: &dyn Fn(IdentityId) -> St
 pub(super) fn taken_text(changes: &[OtherChange], name: &dyn Fn(IdentityId) -> String) -> Option<String> {
     let taken = changes.iter().filter(|c| !c.is_left).map(|c| {
         let (gaussians, share) = (format::things(c.gaussians, "Gaussian"), format::percent(c.share));
-        format!("{gaussians} of '{}' ({share})", name(c.id))
+        format!("{gaussians} from '{}' ({share})", name(c.id))
     });
     let taken: Vec<String> = taken.collect();
     (!taken.is_empty()).then(|| format!("took {}", format::list(&taken)))
@@ -156,7 +158,10 @@ mod tests {
         let (mut flips, touched) = (flips.to_vec(), touched.iter().map(|i| (*i, 1.0)).collect());
         // The first Gaussian of each ten has half of their area.
         let area: Vec<f64> = (0..50).map(|i| if i % 10 == 0 { 9.0 } else { 1.0 }).collect();
-        let changes = OtherIdentities::new(&map(), id).spare(&mut flips, &touched, &area);
+        let before = flips.clone();
+        let (changes, stay) = OtherIdentities::new(&map(), id).spare(&mut flips, &touched, &area);
+        let others = before.into_iter().filter(|flip| !flips.contains(flip));
+        assert_eq!(stay, others.map(|(gaussian, is_in)| (gaussian, !is_in)).collect::<Vec<_>>());
         (flips, changes)
     }
 
@@ -170,10 +175,10 @@ mod tests {
         let (left, changes) = spare(FACE, &all, &[35]);
         assert_eq!((left.as_slice(), changes[0].is_left), (&all[..], false));
         let mut flips = all.to_vec();
-        let changes = OtherIdentities::default().spare(&mut flips, &BTreeMap::new(), &[1.0; 50]);
+        let (changes, _) = OtherIdentities::default().spare(&mut flips, &BTreeMap::new(), &[1.0; 50]);
         assert_eq!((flips.as_slice(), changes), (&all[..], Vec::new()));
         let wide: Vec<f64> = (0..50).map(|i| if i == 30 { 100.0 } else { 1.0 }).collect();
-        let changes = OtherIdentities::new(&map(), FACE).spare(&mut flips, &BTreeMap::new(), &wide);
+        let (changes, _) = OtherIdentities::new(&map(), FACE).spare(&mut flips, &BTreeMap::new(), &wide);
         assert_eq!((flips.as_slice(), changes[0].is_left), (&all[..], false), "two of 109");
     }
 
@@ -201,7 +206,7 @@ mod tests {
         let told = |changes: &[OtherChange]| (left_text(changes, &name), taken_text(changes, &name));
         let (left, taken) = told(&[change(MOUTH, 120, true), change(CUP, 1, false)]);
         assert_eq!(left.as_deref(), Some("left 120 Gaussians of 'mouth' as they were: the stroke does not touch it"));
-        assert_eq!(taken.as_deref(), Some("took 1 Gaussian of 'cup' (12 %)"));
+        assert_eq!(taken.as_deref(), Some("took 1 Gaussian from 'cup' (12 %)"));
         let (left, taken) = told(&[change(MOUTH, 2, true), change(CUP, 1, true)]);
         let text = "left 2 Gaussians of 'mouth' and 1 of 'cup' as they were: the stroke does not touch them";
         assert_eq!((left.as_deref(), taken), (Some(text), None));

@@ -51,6 +51,7 @@ struct Look {
 impl SplatSurface {
     /// Renders the Gaussians, whose [`NEIGHBORS`] are `near`, through some of these cameras.
     pub(crate) fn new(
+        renderers: &mut Renderers,
         cloud: &GaussianCloud,
         near: &NearestGaussians,
         cameras: &[Camera],
@@ -65,7 +66,7 @@ impl SplatSurface {
             let seen = look(renderer, cloud, &cameras[*i].limited_to(SIDE_PX), settings);
             seen.map_err(|e| FindError::Render((i + 1).to_string(), e.into()))
         };
-        Renderers::new(cloud.len()).each(&chosen, draw, |_, (look, sums)| {
+        renderers.each(&chosen, draw, |_, (look, sums)| {
             for (gaussian, sums) in sums.iter().flatten() {
                 colors[*gaussian as usize].iter_mut().zip(sums).for_each(|(c, s)| *c += s);
             }

@@ -9,6 +9,7 @@ mod options;
 mod tracked;
 mod views;
 
+use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 use std::time::Instant;
 
 pub(crate) use options::TrackOptions;
@@ -117,10 +118,15 @@ pub(crate) fn track(
     let (said, inferred) = (t.votes.clone(), views.iter().map(|v| v.unknown).collect());
     let surface = options.by_tree.then(|| t.surface(observer)).transpose()?;
     let (surface, near) = surface.unzip();
-    // The tree is made without any label, so completion goes on beside it.
-    let (tree, completed) = rayon::join(
-        || surface.as_ref().map(Hierarchy::of),
-        || if options.by_photos { t.complete(&views, observer) } else { Ok(()) },
+    // The tree is made without any label, so completion goes on beside it. After a stop, no tree is begun.
+    let is_over = AtomicBool::new(false);
+    let (completed, tree) = rayon::join(
+        || {
+            let done = if options.by_photos { t.complete(&views, observer) } else { Ok(()) };
+            is_over.store(done.is_err(), Relaxed);
+            done
+        },
+        || surface.filter(|_| !is_over.load(Relaxed)).map(|surface| Hierarchy::of(&surface)),
     );
     completed?;
     let begun = Instant::now();
@@ -207,7 +213,7 @@ impl Tracker<'_> {
         begin("Grouping Gaussians", observer)?;
         let cameras: Vec<_> = self.photos.iter().map(|p| p.camera.clone()).collect();
         let near = nearest(self.cloud, NEIGHBORS);
-        let surface = SplatSurface::new(self.cloud, &near, &cameras, self.settings, observer)?;
+        let surface = SplatSurface::new(&mut self.renderers, self.cloud, &near, &cameras, self.settings, observer)?;
         self.secs.add(CarryStage::Group, start);
         Ok((surface, near))
     }

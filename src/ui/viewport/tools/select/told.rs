@@ -53,9 +53,9 @@ mod tests {
         assert!(both.line == left && !both.is_warning, "{both:?}");
         let lines: Vec<&str> = both.all.lines().collect();
         assert_eq!(lines.len(), 3, "{lines:?}");
-        assert!(lines[1].contains("A line changes more") && lines[2] == "Took 20 Gaussians of 'cup' (1.0 %).");
+        assert!(lines[1].contains("A line changes more") && lines[2] == "Took 20 Gaussians from 'cup' (1.0 %).");
         let large = told(false, &[change(1, 0.5, true), change(2, 0.2, false)]).expect("told");
-        assert_eq!((large.line.as_str(), large.is_warning), ("Took 20 Gaussians of 'cup' (20 %).", true));
+        assert_eq!((large.line.as_str(), large.is_warning), ("Took 20 Gaussians from 'cup' (20 %).", true));
         assert!(large.all.ends_with(left), "{}", large.all);
         assert_eq!(told(true, &[]).map(|told| told.line).as_deref(), Some("Only near the click"));
         let along = ToldEffect::new(&MarkEffect { is_along: true, ..MarkEffect::default() }, &name).expect("told");

@@ -100,6 +100,8 @@ struct MarkedLabels<'a> {
     is_in: Vec<bool>,
     /// Labels of Gaussians along lines, whatever their leaves have.
     along: BTreeMap<u32, bool>,
+    /// Labels of Gaussians that were left to other identities.
+    left: BTreeMap<u32, bool>,
 }
 
 impl<'a> MarkedLabels<'a> {
@@ -125,8 +127,8 @@ impl<'a> MarkedLabels<'a> {
             }
         }
         let (marked, now, is_in) = (vec![[0.0; 2]; tree.leaves], before.clone(), given.clone());
-        let (is_given, along) = (!from.is_empty(), BTreeMap::new());
-        let mut labels = Self { tree, given, before, is_given, known: 0.0, alone, marked, now, is_in, along };
+        let (is_given, along, left) = (!from.is_empty(), BTreeMap::new(), BTreeMap::new());
+        let mut labels = Self { tree, given, before, is_given, known: 0.0, alone, marked, now, is_in, along, left };
         labels.known = labels.area(&|leaf| labels.before[leaf]);
         labels
     }
@@ -144,6 +146,8 @@ impl<'a> MarkedLabels<'a> {
         by_click: &[f64],
         others: &OtherIdentities,
     ) -> MarkEffect {
+        // A mark of the same kind may take what was left before; what undoes it takes nothing more.
+        self.left.retain(|_, is_in| *is_in == stroke.is_plus);
         let unmarked = stroke.band.is_some().then(|| self.marked.clone());
         self.mark(stroke);
         let change = match stroke {
@@ -170,12 +174,28 @@ impl<'a> MarkedLabels<'a> {
             }
             _ => self.by_leaves(nodes, stroke),
         };
-        let others = others.spare(&mut flips, &stroke.weights, &self.tree.area);
+        let (others, stay) = others.spare(&mut flips, &stroke.weights, &self.tree.area);
+        self.leave(stay);
         flips.iter().for_each(|&(gaussian, is_in)| self.is_in[gaussian as usize] = is_in);
         // Those that were left to others are not marked.
         let follows = |gaussian: &&u32| self.is_in[**gaussian as usize] == stroke.is_plus;
         self.along.extend(along.iter().flatten().filter(follows).map(|gaussian| (*gaussian, stroke.is_plus)));
         MarkEffect { is_limited, is_along: along.is_some(), others }
+    }
+
+    /// Leaves Gaussians with their labels. A leaf of which nothing else changes has not changed.
+    fn leave(&mut self, stay: Vec<(u32, bool)>) {
+        self.left.extend(stay);
+        if self.left.is_empty() {
+            return;
+        }
+        let mut changed = vec![false; self.tree.leaves];
+        for (gaussian, leaf) in self.tree.leaf.iter().enumerate() {
+            changed[*leaf as usize] |= !self.left.contains_key(&(gaussian as u32));
+        }
+        let leaves: Vec<(usize, bool)> =
+            self.left.iter().map(|(gaussian, is_in)| (self.tree.leaf[*gaussian as usize] as usize, *is_in)).collect();
+        leaves.into_iter().filter(|(leaf, _)| !changed[*leaf]).for_each(|(leaf, is_in)| self.now[leaf] = is_in);
     }
 
     /// Gaussians along a line, if they are to change in place of the leaves: the tree knows regions only, and all of a
@@ -258,7 +278,8 @@ impl<'a> MarkedLabels<'a> {
             let leaf = self.tree.leaf[gaussian] as usize;
             // Gaussians in leaves without a change are as they were given.
             let by_leaf = if self.now[leaf] != self.before[leaf] { self.now[leaf] } else { self.given[gaussian] };
-            self.along.get(&(gaussian as u32)).copied().unwrap_or(by_leaf)
+            let (along, left) = (self.along.get(&(gaussian as u32)), self.left.get(&(gaussian as u32)));
+            left.or(along).copied().unwrap_or(by_leaf)
         };
         let all = (0..self.is_in.len()).map(|gaussian| (gaussian as u32, label(gaussian)));
         all.filter(|(gaussian, is_in)| self.is_in[*gaussian as usize] != *is_in).collect()

@@ -194,6 +194,12 @@ fn what_a_click_does_not_touch_stays_with_its_identity() {
     assert_eq!(correct(vec![click(&[10, 20])], &others), ([10; 3], mouth(false)));
     assert_eq!(correct(vec![click(&[10, 11]), click(&[25])], &others), ([10; 3], mouth(false)));
     assert_eq!(correct(vec![click(&[10, 11]), click(&[12])], &others), ([10, 10, 0], mouth(true)));
+    // A mark that removes takes nothing of what was left, whatever it touches.
+    let minus = |on: &[u32]| StrokeMark { is_plus: false, is_click: false, ..click(on) };
+    for on in [&[25][..], &[25, 26, 11], &[3, 25]] {
+        let [own, near, of_mouth] = correct(vec![click(&[10, 11]), minus(on)], &others).0;
+        assert!(of_mouth == 0 && own <= 10 && near <= 10, "{on:?}: {own}, {near}, {of_mouth}");
+    }
     // What is taken is no change any more.
     assert_eq!(correct(vec![click(&[10, 20]), click(&[11])], &others), ([10; 3], Vec::new()));
 }
