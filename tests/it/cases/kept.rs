@@ -75,7 +75,7 @@ fn a_click_corrects_what_has_a_name_and_tells_what_others_lose() {
     assert_eq!(now.identities.len(), before.identities.len());
     for name in ["box 0", "box 2"] {
         let (had, has) = (own(&before, name).len(), own(&now, name).len());
-        assert!(has <= had && (has == had || done.stderr.contains(&format!("of '{name}'"))), "{}", done.stderr);
+        assert!(has <= had && (has == had || done.stderr.contains(&format!("from '{name}'"))), "{}", done.stderr);
     }
 }
 
