@@ -2,6 +2,8 @@
 
 use std::collections::VecDeque;
 
+use super::distance::squared_distances;
+
 /// The pixels left, right, above and below pixel `i`, of a picture of `n` pixels that is `width` wide.
 pub(crate) fn neighbors(i: usize, width: usize, n: usize) -> impl Iterator<Item = usize> {
     let x = i % width;
@@ -81,27 +83,12 @@ pub(crate) fn grown(width: usize, mut is: Vec<bool>, steps: usize) -> Vec<bool> 
 
 /// Distance of each pixel from the nearest one for which `is` holds, px; infinite if that is more than `most`.
 pub(crate) fn distances(width: usize, is: &[bool], most: usize) -> Vec<f64> {
-    let width = width.max(1);
-    // The nearest one in each row, then over the rows above and below.
-    let mut in_row = vec![usize::MAX; is.len()];
-    for (row, distance) in is.chunks(width).zip(in_row.chunks_mut(width)) {
-        for backward in [false, true] {
-            let mut last = None;
-            for k in 0..row.len() {
-                let x = if backward { row.len() - 1 - k } else { k };
-                last = if row[x] { Some(x) } else { last };
-                distance[x] = distance[x].min(last.map_or(usize::MAX, |last| x.abs_diff(last)));
-            }
-        }
+    if !is.contains(&true) {
+        return vec![f64::INFINITY; is.len()];
     }
-    let squared = |i: usize| {
-        let (x, y) = (i % width, i / width);
-        let rows = y.saturating_sub(most)..(y + most + 1).min(is.len() / width);
-        let near = rows.map(|row| (in_row[row * width + x], row.abs_diff(y))).filter(|(across, _)| *across <= most);
-        near.map(|(across, along)| across * across + along * along).min()
-    };
-    let distance = |squared: usize| (squared <= most * most).then(|| (squared as f64).sqrt());
-    (0..is.len()).map(|i| squared(i).and_then(distance).unwrap_or(f64::INFINITY)).collect()
+    let squared = squared_distances(is, [width, is.len() / width.max(1), 1]);
+    let distance = |d: f32| if d <= (most * most) as f32 { f64::from(d).sqrt() } else { f64::INFINITY };
+    squared.into_iter().map(distance).collect()
 }
 
 #[cfg(test)]

@@ -4,6 +4,7 @@ pub(crate) mod blur;
 pub(crate) mod cholesky;
 pub(crate) mod colormap;
 pub(crate) mod disjoint;
+pub(crate) mod distance;
 pub(crate) mod eigen;
 mod fast_exp;
 mod fast_ln;

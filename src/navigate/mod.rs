@@ -9,7 +9,6 @@
 pub(crate) mod approach;
 pub(crate) mod camera_spline;
 pub mod curve;
-mod distance;
 pub(crate) mod flight;
 pub(crate) mod graph;
 pub mod keypoints;

@@ -8,7 +8,7 @@
 use glam::{DMat3, DVec3};
 use rayon::prelude::*;
 
-use super::distance::squared_distances;
+use crate::math::distance::squared_distances;
 use crate::math::real::Real;
 use crate::math::rotation::matrix_from_quaternion;
 use crate::scene::{Bounds, GaussianCloud};

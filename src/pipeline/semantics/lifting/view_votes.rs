@@ -1,6 +1,7 @@
 //! Votes in one view: weights of each Gaussian in the pixels of each label.
 
 use glam::DVec3;
+use rayon::prelude::*;
 
 use crate::math::lanes::{LANES, Lane};
 use crate::render::{self, ContributionSink, RenderError, TILE_PX, ViewWeights};
@@ -44,13 +45,19 @@ impl ViewVotes {
 fn areas(cloud: &GaussianCloud, camera: &Camera, rows: &[Vec<(u32, IdentityId, f32)>]) -> Vec<f32> {
     let mut areas = vec![0.0; cloud.len()];
     rows.iter().flatten().for_each(|f| areas[f.0 as usize] += f.2);
+    to_square_units(&mut areas, cloud, camera);
+    areas
+}
+
+/// Makes the pixels that each Gaussian takes in a view an area at its depth, square units, so that near and far views
+/// compare.
+pub(crate) fn to_square_units(areas: &mut [f32], cloud: &GaussianCloud, camera: &Camera) {
     let axis = camera.world_from_camera * DVec3::Z;
     let focal = camera.focal_px.x * camera.focal_px.y;
-    for (area, p) in areas.iter_mut().zip(&cloud.positions).filter(|(a, _)| **a > 0.0) {
-        let depth = (cloud.origin + DVec3::from(p.map(f64::from)) - camera.center).dot(axis);
+    areas.par_iter_mut().enumerate().filter(|(_, a)| **a > 0.0).for_each(|(i, area)| {
+        let depth = (cloud.world_position(i) - camera.center).dot(axis);
         *area *= (depth * depth / focal) as f32;
-    }
-    areas
+    });
 }
 
 /// Returns the label that all pixels of each vector of a row have, row after row; `None` for several.

@@ -4,8 +4,7 @@ use std::collections::BTreeMap;
 
 use super::seen::ViewPart;
 use crate::math::grid::distances;
-use crate::render::{RenderError, RenderSettings, Renderer};
-use crate::scene::GaussianCloud;
+use crate::render::{RenderError, ViewWeights};
 
 /// Width of a surface in widths of a line, up to which it is about as wide as the line.
 pub(super) const AS_WIDE: f64 = 2.0;
@@ -25,11 +24,9 @@ pub(super) struct LineBand {
 }
 
 impl LineBand {
-    /// Looks around the pixels `is_line` of a part of a view; `None` if the part has too little room for that.
+    /// Looks around the pixels `is_line` of a part of a view, of which `view` has the weights; `None` if the part has too little room for that.
     pub(super) fn new(
-        renderer: &mut Renderer,
-        cloud: &GaussianCloud,
-        settings: &RenderSettings,
+        view: &mut ViewWeights<'_>,
         (part, is_line): (&ViewPart, &[bool]),
         (radius_px, room_px): (f64, usize),
     ) -> Result<Option<Self>, RenderError> {
@@ -41,18 +38,18 @@ impl LineBand {
         near.sort_by(f64::total_cmp);
         let Some(reach) = near.get((LOOKED_AT * area_px) as usize).copied() else { return Ok(None) };
         let mut around: BTreeMap<u32, f32> = BTreeMap::new();
-        for seen in part.weights(renderer, cloud, settings, &|i| far[i] <= reach)? {
+        for seen in part.weights(view, &|i| far[i] <= reach)? {
             *around.entry(seen.gaussian).or_default() += seen.weight;
         }
         // A Gaussian has most of its weight where its center is.
         let is_along = |i: &u32| {
-            let at = part.camera.project(cloud.world_position(*i as usize));
+            let at = part.camera.project(view.cloud.world_position(*i as usize));
             at.filter(|at| at.min_element() >= 0.0).is_some_and(|at| {
                 let [x, y] = [at.x as usize, at.y as usize];
                 x < part.width_px && y < part.height_px && is_wide(y * part.width_px + x)
             })
         };
-        let along = (0..cloud.len() as u32).filter(is_along).collect();
+        let along = (0..view.cloud.len() as u32).filter(is_along).collect();
         Ok(Some(Self { along, area_px, around }))
     }
 }
@@ -61,6 +58,7 @@ impl LineBand {
 mod tests {
     use super::super::hierarchy::tests::{H, W, cameras, sheet};
     use super::*;
+    use crate::render::{RenderSettings, Renderer};
     use crate::scene::Mask;
 
     /// Surroundings of a level line of three rows, 40 px long, in the middle of the sheet.
@@ -71,8 +69,9 @@ mod tests {
         let is_line = part.cut(&mask);
         assert_eq!(is_line.iter().filter(|is| **is).count(), mask.area());
         let (settings, cloud) = (RenderSettings::default(), sheet().0);
-        let found = LineBand::new(&mut Renderer::new(), &cloud, &settings, (&part, &is_line), (radius_px, room_px));
-        found.expect("drawn")
+        let mut renderer = Renderer::new();
+        let mut view = renderer.weights(&cloud, &part.camera, &settings);
+        LineBand::new(&mut view, (&part, &is_line), (radius_px, room_px)).expect("drawn")
     }
 
     #[test]

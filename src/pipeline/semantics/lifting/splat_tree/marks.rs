@@ -85,13 +85,14 @@ impl StrokeMarks {
         let room_px = if is_click { ROOM_PX } else { ROOM_PX.max((ROOM * area / length2.sqrt()) as usize) };
         let part = ViewPart::around(&near, room_px, &stroke.camera);
         let is_in = part.cut(&stroke.pixels);
-        let weights = pointed_at(part.weights(renderer, cloud, settings, &|i| is_in[i])?.into_iter());
+        let mut view = renderer.weights(cloud, &part.camera, settings);
+        let weights = pointed_at(part.weights(&mut view, &|i| is_in[i])?.into_iter());
         let units_per_px = units_per_px(cloud, &stroke.camera, &weights);
         let size = length2.max(CLICK * area) * units_per_px.powi(2);
         let band = match median_radius(cloud, &weights).filter(|_| !is_click) {
             Some(radius) => {
                 let (place, reach) = ((&part, is_in.as_slice()), (radius / units_per_px, room_px));
-                LineBand::new(renderer, cloud, settings, place, reach)?
+                LineBand::new(&mut view, place, reach)?
             }
             None => None,
         };

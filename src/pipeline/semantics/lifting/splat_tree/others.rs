@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use crate::math::format;
-use crate::scene::{IdentityId, NO_IDENTITY, SemanticMap};
+use crate::scene::{Identities, IdentityId, NO_IDENTITY, SemanticMap};
 
 /// Largest share of another identity's visible area that a mark takes without touching it.
 const UNTOUCHED: f64 = 0.03;
@@ -16,8 +16,7 @@ pub(crate) struct OtherIdentities {
     of: Vec<IdentityId>,
     /// True for the parts of the thing: they lose what the thing loses, all others what it gains.
     is_part: Vec<bool>,
-    /// Whole of each identity.
-    whole: Vec<IdentityId>,
+    all: Identities,
 }
 
 /// Change of another identity by a mark.
@@ -44,18 +43,10 @@ impl OtherIdentities {
         let all = &map.identities;
         let mut is_part = all.descendants(id);
         is_part.iter_mut().skip(id as usize).take(1).for_each(|own| *own = false);
-        let whole = std::iter::once(NO_IDENTITY).chain(all.iter().map(|(_, i)| i.parent)).collect();
-        let mut others = Self { of: map.identity_of.clone(), is_part, whole };
-        let own: BTreeSet<IdentityId> = others.with_wholes(id).collect();
+        let own: BTreeSet<IdentityId> = all.ancestors(id).collect();
         let is_other = |of: IdentityId| !own.contains(&of) && all.get(of).is_some();
-        others.of.iter_mut().filter(|of| !is_other(**of)).for_each(|of| *of = NO_IDENTITY);
-        others
-    }
-
-    /// An identity and its wholes, from the inside out.
-    fn with_wholes(&self, id: IdentityId) -> impl Iterator<Item = IdentityId> {
-        let whole = |id: &IdentityId| self.whole.get(*id as usize).copied().filter(|whole| *whole != NO_IDENTITY);
-        std::iter::successors(Some(id), whole).take(self.whole.len())
+        let of = map.identity_of.iter().map(|of| if is_other(*of) { *of } else { NO_IDENTITY }).collect();
+        Self { of, is_part, all: all.clone() }
     }
 
     /// Identity that loses a Gaussian if that gets this label.
@@ -91,7 +82,7 @@ impl OtherIdentities {
         }
         // A mark on a part touches its whole.
         let labels: BTreeSet<IdentityId> = touched.keys().filter_map(|i| self.of.get(*i as usize)).copied().collect();
-        let touched: BTreeSet<IdentityId> = labels.into_iter().flat_map(|id| self.with_wholes(id)).collect();
+        let touched: BTreeSet<IdentityId> = labels.into_iter().flat_map(|id| self.all.ancestors(id)).collect();
         let change = |(id, (gaussians, lost)): (IdentityId, (usize, f64))| {
             let share = lost / whole[&id].max(f64::MIN_POSITIVE);
             let change = OtherChange { id, gaussians, share, is_left: false };
@@ -136,7 +127,7 @@ pub(super) fn taken_text(changes: &[OtherChange], name: &dyn Fn(IdentityId) -> S
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::{Identities, Level};
+    use crate::scene::Level;
 
     const DOLL: IdentityId = 1;
     const FACE: IdentityId = 2;

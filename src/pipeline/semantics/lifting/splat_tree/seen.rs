@@ -5,8 +5,8 @@ use std::collections::BTreeMap;
 use glam::DVec2;
 
 use crate::math::lanes::Lane;
-use crate::render::{ContributionSink, RenderError, RenderSettings, Renderer, TILE_PX};
-use crate::scene::{Camera, GaussianCloud, Mask, PixelBox};
+use crate::render::{ContributionSink, RenderError, TILE_PX, ViewWeights};
+use crate::scene::{Camera, Mask, PixelBox};
 
 /// Share of a pixel's weight that counts as the target, from its largest contributor on.
 const POINTED_AT: f32 = 0.6;
@@ -49,17 +49,15 @@ impl ViewPart {
         (0..self.width_px * self.height_px).map(|i| mask.contains(at(i))).collect()
     }
 
-    /// Returns the weights of all Gaussians in the pixels for which `is_marked` holds.
+    /// Returns the weights of all Gaussians in the pixels for which `is_marked` holds, of this part's `view`.
     pub(super) fn weights(
         &self,
-        renderer: &mut Renderer,
-        cloud: &GaussianCloud,
-        settings: &RenderSettings,
+        view: &mut ViewWeights<'_>,
         is_marked: &(dyn Fn(usize) -> bool + Sync),
     ) -> Result<Vec<SeenWeight>, RenderError> {
         let row = || Row { is_marked, width_px: self.width_px, found: Vec::new() };
         let mut rows: Vec<Row<'_>> = (0..self.height_px.div_ceil(TILE_PX)).map(|_| row()).collect();
-        renderer.contributions(cloud, &self.camera, settings, &mut rows)?;
+        view.give(&mut rows)?;
         Ok(rows.into_iter().flat_map(|row| row.found).collect())
     }
 }

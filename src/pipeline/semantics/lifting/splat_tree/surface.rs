@@ -1,7 +1,7 @@
 //! Gaussians as a surface: their neighbors, their colors, and the visible borders between them in the views of a
 //! scene.
 
-use glam::{DVec2, DVec3};
+use glam::DVec2;
 use rayon::prelude::*;
 
 use super::super::error::FindError;
@@ -11,6 +11,7 @@ use super::super::regions::lab::{lab, planes};
 use super::super::regions::shape::ends;
 use super::super::regions::tree::{Border, Piece};
 use super::super::renderers::Renderers;
+use super::super::view_votes::to_square_units;
 use crate::math::lanes::Lane;
 use crate::pipeline::observer::{Observer, Ticker};
 use crate::render::{ContributionSink, Features, RenderError, RenderSettings, Renderer, TILE_PX};
@@ -118,12 +119,7 @@ fn look(
     let sums: ColorSums = rows.into_iter().map(|row| row.found).collect();
     let mut areas = vec![0.0_f32; cloud.len()];
     sums.iter().flatten().for_each(|(gaussian, sums)| areas[*gaussian as usize] += sums[0]);
-    let axis = camera.world_from_camera * DVec3::Z;
-    let focal = camera.focal_px.x * camera.focal_px.y;
-    areas.par_iter_mut().enumerate().filter(|(_, a)| **a > 0.0).for_each(|(i, area)| {
-        let depth = (cloud.world_position(i) - camera.center).dot(axis);
-        *area *= (depth * depth / focal) as f32;
-    });
+    to_square_units(&mut areas, cloud, camera);
     let look = Look {
         strength: strength(&ImagePlanes { width, channels: &channels }),
         ends: ends(&depth, width, 0.5 * (camera.focal_px.x + camera.focal_px.y)),

@@ -36,11 +36,21 @@ impl DrawnLine {
                 // One pixel at least, wherever its center is.
                 let radius = (self.radius_pt * scale).max(std::f32::consts::FRAC_1_SQRT_2);
                 let pairs: Vec<&[Vec2]> = if at.len() > 1 { at.windows(2).collect() } else { vec![&at] };
-                let all = Rect::from_points(&at.iter().map(|p| p.to_pos2()).collect::<Vec<_>>()).expand(radius + 1.0);
-                Mask::from_fn(w, h, |i| {
-                    let p = pixel(i);
-                    all.contains(p.to_pos2()) && pairs.iter().any(|pair| !pair.is_empty() && is_near(pair, p, radius))
-                })
+                let mut covered = vec![false; w * h];
+                for pair in pairs.into_iter().filter(|pair| !pair.is_empty()) {
+                    let [a, b] = [pair[0], pair[pair.len() - 1]];
+                    // Pixels are tested in the box of each piece only: a line may have hundreds in a large view.
+                    let span = |a: f32, b: f32, n: usize| {
+                        let end = |v: f32| (v.max(0.0) as usize).min(n);
+                        end(a.min(b) - radius - 1.0)..end(a.max(b) + radius + 2.0)
+                    };
+                    for y in span(a.y, b.y, h) {
+                        for i in span(a.x, b.x, w).map(|x| y * w + x) {
+                            covered[i] |= is_near(pair, pixel(i), radius);
+                        }
+                    }
+                }
+                Mask::from_fn(w, h, |i| covered[i])
             }
         }
     }
