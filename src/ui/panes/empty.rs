@@ -97,7 +97,7 @@ impl FirstPage {
     fn keep_picture(&mut self, state: &AppState, viewport: &Viewport, tasks: &Tasks, workspace: &Arc<Workspace>) {
         let Some(scene) = state.scene.as_ref().filter(|_| !state.is_training()) else { return };
         let now = (state.scene_number, scene.out.clone(), state.is_trained());
-        if self.kept_for == now || viewport.shows_growth() || viewport.picture().is_none_or(|p| !p.full) {
+        if self.kept_for == now || viewport.shows_growth() || viewport.full_picture().is_none() {
             return;
         }
         let Ok(Some(pixels)) = viewport.pixels() else { return };

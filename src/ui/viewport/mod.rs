@@ -140,6 +140,11 @@ impl Viewport {
         self.display.picture()
     }
 
+    /// The frame of the newest request, once it is drawn at full resolution.
+    pub fn full_picture(&self) -> Option<&ViewPicture> {
+        self.display.full_picture(self.requests.ticket())
+    }
+
     /// The Gaussians on screen.
     pub fn cloud(&self) -> Option<&Versioned<GaussianCloud>> {
         self.cloud.as_ref()

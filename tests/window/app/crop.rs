@@ -57,13 +57,13 @@ fn a_crop_box_is_drawn_inverted_undone_and_exported() {
     let inside = xs.iter().filter(|x| **x <= cut).count();
     assert!(w.shows(&format!("{n} of {n} Gaussians")), "the box is around everything");
     put(&mut w, "To x", cut);
-    // While it moves or the machine is busy, a coarser one comes first.
-    let is_full = |a: &App| a.viewport.picture().is_some_and(|p| p.full);
-    w.until("a picture of a third", |a| is_full(a) && picture(a) != before);
+    // Pictures of what was typed so far, and coarser ones, come first.
+    let drawn = |a: &App| a.viewport.full_picture().map(|p| p.rgb.clone());
+    w.until("a picture of a third", |a| drawn(a).is_some_and(|drawn| drawn != before));
     assert!(w.shows(&format!("{inside} of {n} Gaussians")) && inside < n / 2);
     let third = picture(w.app());
     w.click("Invert");
-    w.until("a picture of the rest", |a| is_full(a) && picture(a) != third);
+    w.until("a picture of the rest", |a| drawn(a).is_some_and(|drawn| drawn != third));
     assert!(w.shows(&format!("{} of {n} Gaussians", n - inside)));
     w.click("Invert");
     w.until("the third", |a| picture(a) == third);

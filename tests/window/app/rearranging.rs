@@ -66,7 +66,7 @@ fn what_no_photo_shows_is_measured_seen_deleted_and_brought_back() {
     let bars = w.harness.get_by_label("Histogram").rect();
     let at = |x: f32| bars.left_center() + egui::vec2(x * bars.width(), 0.0);
     drag(&mut w, [at(0.02), at(0.1), at(0.4)]);
-    w.until("they are marked", |a| a.viewport.picture().is_some_and(|p| p.full) && picture(a) != plain);
+    w.until("they are marked", |a| a.viewport.full_picture().is_some() && picture(a) != plain);
     assert!(w.shows("Delete"));
     w.ask(Action::DeleteChosen);
     let edited = folder.path().join("scene-edited");

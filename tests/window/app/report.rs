@@ -78,11 +78,11 @@ fn a_report_is_opened_compared_and_its_settings_are_applied() {
     let before = w.app().viewport.picture().expect("drawn").rgb.clone();
     w.click("Apply to the view");
     assert_eq!(w.app().viewport.overrides.antialias, Some(true));
-    w.until("another picture", |a| a.viewport.picture().is_some_and(|p| p.full && p.rgb != before));
+    w.until("another picture", |a| a.viewport.full_picture().is_some_and(|p| p.rgb != before));
     assert!(w.shows("rendered with filter on") && w.shows("Already active"));
     w.click("default: as the scene says");
     w.click("Apply to the view");
-    w.until("the first picture", |a| a.viewport.picture().is_some_and(|p| p.full && p.rgb == before));
+    w.until("the first picture", |a| a.viewport.full_picture().is_some_and(|p| p.rgb == before));
 
     w.ask(Action::TogglePane(Pane::Training));
     w.click("Training");

@@ -1,4 +1,4 @@
-//! Photos as evidence: known labels of a view, rendered into its photo, grow over unknown pixels ([`growth`]) up to the
+//! Photos as evidence: known labels of a view, rendered into its photo, grow over unknown pixels ([`super::growth`]) up to the
 //! borders in the photo or in the shape of the scene.
 
 use std::time::Instant;
