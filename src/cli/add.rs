@@ -31,7 +31,7 @@ pub(crate) struct AddArgs {
     /// Folder of the new scene
     #[arg(long)]
     out: PathBuf,
-    /// Training steps [default: 150 for each new photo, at least 300, at most a sixth of the scene's]
+    /// Training steps [default: 150 for each new photo, at least 300, at most a tenth of the scene's]
     #[arg(long, value_parser = number::within(1..=1_000_000_000_u64))]
     steps: Option<u64>,
     /// Focal length of pictures without poses at full size, px

@@ -72,10 +72,10 @@ impl Schedule {
     }
 
     /// Rates at `step`, counted from 0: exponential decay by 100 for positions, constant otherwise. In a refinement all
-    /// end low, so that photos which agreed before agree again; positions begin a little above the end of training.
+    /// end low, so that photos which agreed before agree again; positions begin well above the end of training.
     pub(crate) fn rates(&self, step: u64) -> Rates {
         let t = self.done(step) as f64 / self.done(self.steps).max(1) as f64;
-        let (begin, settle) = if self.from > 0 { (0.5, 0.1_f64.powf(t)) } else { (0.0, 1.0) };
+        let (begin, settle) = if self.from > 0 { (0.25, 0.03_f64.powf(t)) } else { (0.0, 1.0) };
         let position = 1.6e-4 * self.extent * 0.01_f64.powf(begin + t * (1.0 - begin));
         let rate = |r: f64| (r * settle * self.damping) as f32;
         Rates {
@@ -139,7 +139,7 @@ mod tests {
         let (s, end) = (Schedule::refining(&config, 2.0, 7_000), schedule(7_000).rates(7_000));
         let [first, last] = [7_000, 7_900].map(|step| s.rates(step));
         assert!(first.position > 5.0 * end.position && last.position < 1.01 * end.position);
-        assert!(first.opacity_logit == end.opacity_logit && last.opacity_logit < 0.2 * end.opacity_logit);
+        assert!(first.opacity_logit == end.opacity_logit && last.opacity_logit < 0.05 * end.opacity_logit);
         assert_eq!(s.sh_degree(7_000), 3);
         assert!(!(7_000..=7_900).any(|done| s.resets(done)));
         let rounds: Vec<u64> = (7_000..=7_900).filter(|done| s.densifies(*done)).collect();
