@@ -65,8 +65,8 @@ impl Hierarchy {
     }
 
     /// Returns the Gaussians of something known, `from`, as marks correct it. The cost of area rises while a click
-    /// changes more than all of it and more than a click is about, so that a small part does not grow over all around
-    /// it. Of other identities, a mark changes hardly more than it touches.
+    /// adds more than all of it and more than a click is about, so that a small part does not grow over all around it;
+    /// and while a click removes more than it is about. Of other identities, a mark changes hardly more than it touches.
     pub(crate) fn correct(&self, marks: &StrokeMarks, from: &[usize], others: &OtherIdentities) -> MarkedSplats {
         self.marked(marks, from, &CORRECTED_BY_CLICK, others)
     }
@@ -159,8 +159,10 @@ impl<'a> MarkedLabels<'a> {
         };
         let mut nodes = self.cheapest(stroke, change);
         let mut is_limited = false;
+        // A click that removes a part of something is not about all of it.
+        let most = if stroke.is_plus { self.known.max(stroke.size) } else { stroke.size };
         for dearer in by_click[1..].iter().filter(|_| stroke.is_click) {
-            if self.area(&|leaf| nodes[leaf] != self.now[leaf]) <= self.known.max(stroke.size) {
+            if self.area(&|leaf| nodes[leaf] != self.now[leaf]) <= most {
                 break;
             }
             (nodes, is_limited) = (self.cheapest(stroke, [*dearer; 2]), true);

@@ -140,6 +140,21 @@ fn a_click_beside_a_small_part_does_not_take_all_around_it() {
 }
 
 #[test]
+fn a_click_that_removes_does_not_take_all_of_something_large() {
+    // A Gaussian without a visible border to twenty others.
+    let (tree, from) = (made(&[1, 20], &[([0, 1], 0.0)]), Vec::from_iter(0..21));
+    let left = |size: f64| {
+        let marks = StrokeMarks { strokes: vec![StrokeMark { is_plus: false, size, ..click(&[0]) }] };
+        let found = tree.correct(&marks, &from, &OtherIdentities::default());
+        let of_given = tree.select(&marks, &from).is_in;
+        let count = |of: &[bool]| of.iter().filter(|is_in| **is_in).count();
+        (count(&found.is_in), found.effect.is_limited, count(&of_given))
+    };
+    assert_eq!(left(5.0), (20, true, 0), "the control, of what is only given, loses all");
+    assert_eq!(left(25.0), (0, false, 0), "what is no larger than a click is about goes with it");
+}
+
+#[test]
 fn the_last_stroke_is_taken_back_and_selecting_twice_gives_the_same() {
     let (cloud, whose) = sheet();
     let tree = hierarchy(&cloud);
