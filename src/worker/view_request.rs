@@ -153,6 +153,11 @@ pub struct ViewPicture {
 }
 
 impl ViewPicture {
+    /// Returns whether it is the picture of the request with `ticket` at full resolution.
+    pub(crate) fn is_full_of(&self, ticket: u64) -> bool {
+        self.full && self.ticket == ticket
+    }
+
     /// The picture of the second view, if there is one.
     pub fn second(&self) -> Option<&PictureBeside> {
         self.beside.first()

@@ -9,6 +9,9 @@ use fmlgs::scene::{Bounds, Camera, GaussianCloud};
 use glam::DVec3;
 use rand::{RngExt, SeedableRng};
 
+/// An address at which nothing listens. A port that was free a moment ago may be another test's by now.
+pub const NOBODY: &str = "http://127.0.0.1:1";
+
 /// The folder of real inputs, or `None` where it is absent.
 pub fn data_dir() -> Option<PathBuf> {
     let dir = std::env::var_os("FMLGS_DATA")

@@ -12,6 +12,8 @@ use fmlgs::math::stats;
 use fmlgs::models::catalog::{self, InstallError, ModelEntry, ModelState};
 use fmlgs::models::fetch::{FetchError, Timeouts};
 
+use crate::common::NOBODY;
+
 fn fixtures() -> PathBuf {
     PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("tests/fixtures/networks")
 }
@@ -208,9 +210,7 @@ fn the_command_line_says_what_is_here_and_what_to_do() {
     assert!(error.contains("clip-vit-b32.json"), "{error}");
     run(&["models", "check", "--picture", "x.png"]).fails_with(2);
     // An air-gapped machine: the address cannot be reached.
-    let port = TcpListener::bind("127.0.0.1:0").expect("a port").local_addr().expect("bound").port();
-    let url = format!("http://127.0.0.1:{port}");
-    let offline = run(&["-q", "models", "fetch", "sam2.1-tiny", "--from", &url]).fails_with(1).stderr;
+    let offline = run(&["-q", "models", "fetch", "sam2.1-tiny", "--from", NOBODY]).fails_with(1).stderr;
     assert!(offline.contains("cannot be reached") && offline.contains("bring the file yourself"), "{offline}");
 }
 

@@ -61,11 +61,6 @@ impl Display {
         self.picture.as_deref()
     }
 
-    /// The frame of the request with `ticket`, once it is drawn at full resolution.
-    pub(super) fn full_picture(&self, ticket: u64) -> Option<&ViewPicture> {
-        self.picture().filter(|picture| picture.full && picture.ticket == ticket)
-    }
-
     /// The camera for overlays of a frame in `rect`: the frame's own, so that both move together.
     pub(super) fn overlay_camera(&self, eye: &Eye, rect: Rect) -> Camera {
         match self.picture() {

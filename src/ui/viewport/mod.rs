@@ -142,7 +142,7 @@ impl Viewport {
 
     /// The frame of the newest request, once it is drawn at full resolution.
     pub fn full_picture(&self) -> Option<&ViewPicture> {
-        self.display.full_picture(self.requests.ticket())
+        self.picture().filter(|picture| picture.is_full_of(self.requests.ticket()))
     }
 
     /// The Gaussians on screen.

@@ -5,7 +5,6 @@
 mod server;
 
 use std::fs;
-use std::net::TcpListener;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
@@ -13,6 +12,7 @@ use std::time::{Duration, Instant};
 use fmlgs::models::fetch::{FetchError, FileToFetch, MOST_UNPROMISED, Timeouts, fetch, sha256};
 
 use self::server::{ENDLESS, Server, Turn, content, server};
+use crate::common::NOBODY;
 
 fn impatient() -> Timeouts {
     Timeouts { stall: Duration::from_millis(300), attempts: 3, pause: Duration::from_millis(5) }
@@ -181,9 +181,7 @@ fn a_swapped_file_is_refused() {
 #[test]
 fn without_a_network_the_error_says_what_to_do() {
     let p = place();
-    // A port that was free a moment ago.
-    let port = TcpListener::bind("127.0.0.1:0").expect("a port").local_addr().expect("bound").port();
-    let url = format!("http://127.0.0.1:{port}/model.onnx");
+    let url = format!("{NOBODY}/model.onnx");
     let error = fetch(
         &FileToFetch { url: &url, to: &p.to, bytes: None, most: MOST_UNPROMISED, sha256: None },
         impatient(),

@@ -115,7 +115,8 @@ impl ViewTool for MaskBrush {
     /// Paints along drags, fills at clicks; erases with Shift.
     fn pointer(&mut self, response: &Response, area: ViewArea, scene: &mut ToolScene<'_>, _cx: &mut Ctx<'_>) {
         // Only a full frame has the pixels of the maps, and a late one does not match the current view.
-        let Some(picture) = scene.display.full_picture(scene.ticket) else { return };
+        let picture = scene.display.picture().filter(|picture| picture.is_full_of(scene.ticket));
+        let Some(picture) = picture else { return };
         self.on_view(&picture.camera, scene.queries.truth().as_deref());
         let Some(pos) = response.interact_pointer_pos() else { return };
         let scale = picture.camera.width_px as f32 / area.shown.width();
