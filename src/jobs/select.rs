@@ -113,7 +113,7 @@ pub struct Selected {
     neighbors: Option<Arc<SplatNeighbors>>,
     /// Indices of the selected Gaussians, ascending.
     pub(crate) gaussians: Vec<u32>,
-    /// Effect of the last stroke beside the selection itself; nothing after another step.
+    /// Effect of the last of the strokes beside the selection itself; nothing without strokes.
     pub(crate) effect: MarkEffect,
     /// Objects and parts with the selection, and its identity among them; `NO_IDENTITY` if nothing is selected.
     pub(crate) preview: Arc<SemanticMap>,

@@ -166,13 +166,13 @@ fn status(tool: &SelectTool, ui: &mut Ui, scene: &ToolScene<'_>, cx: &Ctx<'_>) {
     count(tool, ui, scene, cx);
     let all = cx.state.semantics.as_ref().map(|map| &map.identities);
     let name = |id| all.map_or_else(String::new, |all| cx.state.labels.full_name(all, id));
-    // What is cut is told on hover.
-    let mut tell = |text: String, color| ui.add(Label::new(RichText::new(text).color(color)).truncate());
+    // What is cut is told on hover, once.
+    let label = |text: String, color| Label::new(RichText::new(text).color(color)).truncate();
     if let Some(taken) = tool.taken_object() {
-        tell(taken.text(&name(taken.from)), theme::warning());
+        ui.add(label(taken.text(&name(taken.from)), theme::warning()));
     } else if let Some(told) = tool.selected.as_ref().and_then(|s| ToldEffect::new(&s.effect, &name)) {
         let color = if told.is_warning { theme::warning() } else { theme::weak() };
-        tell(told.line, color).on_hover_text(told.all);
+        ui.add(label(told.line, color).show_tooltip_when_elided(false)).on_hover_text(told.all);
     }
 }
 

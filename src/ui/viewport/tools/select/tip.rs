@@ -34,11 +34,12 @@ impl SelectTip {
         if shape == SelectShape::Click { 0.5 * self.line_width_px } else { self.brush_pt }
     }
 
-    /// Makes it one step wider or narrower.
+    /// Makes it one step wider or narrower, with shapes that have a size.
     pub(crate) fn step(&mut self, shape: SelectShape, is_wider: bool) {
         let (size, range) = match shape {
             SelectShape::Click => (&mut self.line_width_px, WIDTHS_PX),
-            _ => (&mut self.brush_pt, RADII_PT),
+            SelectShape::Brush | SelectShape::Sphere => (&mut self.brush_pt, RADII_PT),
+            _ => return,
         };
         let next = if is_wider { (*size * STEP).max(*size + 1.0) } else { (*size / STEP).min(*size - 1.0) };
         *size = next.round().clamp(*range.start(), *range.end());
@@ -74,5 +75,8 @@ mod tests {
         assert_eq!(tip.line_width_px, 2.0, "a whole pixel at least");
         tip.step(SelectShape::Brush, true);
         assert!(tip.brush_pt > first.brush_pt && tip.line_width_px == 2.0);
+        let before = tip;
+        tip.step(SelectShape::Rectangle, true);
+        assert_eq!(tip, before, "a rectangle has no tip");
     }
 }
