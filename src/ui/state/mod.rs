@@ -58,7 +58,7 @@ pub struct AppState {
     /// Folder of the latest scene that photos were added in.
     pub(crate) closer: Option<PathBuf>,
     /// Counts the scenes shown so far; changes when `scene` does.
-    pub(crate) scene_number: u64,
+    pub scene_number: u64,
     /// Decisions on what is left out for the scene, with their reasons.
     pub(crate) plan: ScenePlan,
     /// True if the Gaussians on screen are drawn with the 2-D filter of Mip-Splatting.
