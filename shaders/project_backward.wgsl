@@ -115,7 +115,7 @@ fn main(@builtin(global_invocation_id) global: vec3<u32>, @builtin(num_workgroup
         let n = cross(p.u, p.v);
         let unit = n * inverseSqrt(max(p.sharp, 1e-30));
         let swing = to_rho * (unit * inverseSqrt(p.determinant) - n * (rho / p.determinant));
-        let pull = to_rho * rho * BLUR_PX2 / p.determinant;
+        let pull = to_rho * rho * view.blur / p.determinant;
         to_u += cross(p.v, swing) - pull * p.u;
         to_v += cross(swing, p.u) - pull * p.v;
         to_opacity *= rho;

@@ -85,8 +85,8 @@ fn linearize(i: u32) -> Projection {
     let uu = dot(p.u, p.u);
     let vv = dot(p.v, p.v);
     p.sharp = dot(normal, normal);
-    p.covariance = vec3<f32>(uu + BLUR_PX2, dot(p.u, p.v), vv + BLUR_PX2);
-    p.determinant = p.sharp + BLUR_PX2 * (uu + vv) + BLUR_PX2 * BLUR_PX2;
+    p.covariance = vec3<f32>(uu + view.blur, dot(p.u, p.v), vv + view.blur);
+    p.determinant = p.sharp + view.blur * (uu + vv) + view.blur * view.blur;
     p.opacity = stable_sigmoid(geometry[at + 10u]);
     return p;
 }

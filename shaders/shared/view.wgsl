@@ -24,5 +24,6 @@ struct View {
     antialias: u32,
     // Extra channels per Gaussian.
     channels: u32,
-    pad0: u32,
+    // Variance added to each splat along both picture axes, px^2.
+    blur: f32,
 }

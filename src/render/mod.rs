@@ -98,7 +98,9 @@ pub struct RenderSettings {
     pub background: [f32; 3],
     /// Distance of the near plane in scene units: Gaussians whose center is nearer are left out.
     pub near: f64,
-    /// Scale opacities so that [`BLUR_PX2`] keeps a splat's energy (Mip-Splatting's 2-D filter).
+    /// Variance added to each splat along both picture axes, px².
+    pub blur_px2: f64,
+    /// Scale opacities so that the blur keeps a splat's energy (Mip-Splatting's 2-D filter).
     pub antialias: bool,
     /// Also return expected depth `sum(w z)` and median depth; of surfels, normals and distortion
     /// too.
@@ -120,6 +122,7 @@ impl Default for RenderSettings {
             sh_degree: 3,
             background: [0.0; 3],
             near: 0.01,
+            blur_px2: BLUR_PX2,
             antialias: false,
             depth: false,
             surfels: false,
@@ -132,12 +135,14 @@ impl Default for RenderSettings {
 impl RenderSettings {
     /// Returns whether Gaussians have the same weights at each pixel as with `other`.
     pub(crate) fn sees_like(&self, other: &Self) -> bool {
-        let shape = |s: &Self| (s.near, s.antialias, s.surfels, s.cutoffs);
+        let shape = |s: &Self| (s.near, s.blur_px2, s.antialias, s.surfels, s.cutoffs);
         shape(self) == shape(other)
     }
-}
 
-impl RenderSettings {
+    /// Returns the same with another blur, px².
+    pub(crate) fn blurred_by(&self, blur_px2: f64) -> Self {
+        Self { blur_px2, ..self.clone() }
+    }
     /// Settings for Gaussians of this mode.
     pub(crate) fn of_mode(mode: SplatRenderMode) -> Self {
         let (antialias, surfels) = (mode == SplatRenderMode::Mip, mode == SplatRenderMode::Surfels);

@@ -69,7 +69,7 @@ fn projection_matches_the_oracle() {
             let found = renderer.inspect().unwrap().unwrap();
             let mut drawn = 0;
             let mut errors = Vec::new();
-            let view = CameraView::<f64>::new(&scene.camera, scene.cloud.origin, scene.settings.near);
+            let view = CameraView::<f64>::new(&scene.camera, scene.cloud.origin, &scene.settings);
             for (i, splat) in found.splats.iter().enumerate().filter(|(_, s)| s.radius > 0.0) {
                 drawn += 1;
                 let gaussian = scene.cloud.gaussian(i);

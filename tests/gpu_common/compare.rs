@@ -69,7 +69,7 @@ pub struct Bands {
 /// `margin` of a cut-off (relative), or of the median's one half, make a pixel boundary; a
 /// Gaussian is boundary if it is drawn in such a pixel.
 pub fn bands(cloud: &GaussianCloud<f64>, camera: &Camera, settings: &RenderSettings, margin: f64) -> Bands {
-    let view = CameraView::<f64>::new(camera, cloud.origin, settings.near);
+    let view = CameraView::<f64>::new(camera, cloud.origin, settings);
     let [w, h] = [camera.width_px as usize, camera.height_px as usize];
     let mut splats = Vec::new();
     for i in 0..cloud.len() {

@@ -2,8 +2,13 @@
 //!
 //! Rendered once per view; queries only read it.
 
-use crate::render::{DrawError, LabelWinner, RenderError, RenderSettings, Renderer, ViewWeights, label_winners};
+use crate::render::{
+    BLUR_PX2, DrawError, LabelWinner, RenderError, RenderSettings, Renderer, ViewWeights, label_winners,
+};
 use crate::scene::{Camera, GaussianCloud, Identities, IdentityId, Mask};
+
+/// Least blur with which identities are drawn, px²: with less, things get gaps.
+pub(crate) const LEAST_BLUR_PX2: f64 = 0.1;
 
 /// Identities of a view's pixels, row-major.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -35,7 +40,8 @@ impl ViewMap {
         camera: &Camera,
         settings: &RenderSettings,
     ) -> Result<Self, DrawError> {
-        let winners = renderer.label_winners(cloud, (of, &objects(identities)), camera, settings)?;
+        let settings = settings_for(identities, settings);
+        let winners = renderer.label_winners(cloud, (of, &objects(identities)), camera, &settings)?;
         Ok(Self::of_winners(camera.width_px as usize, &winners))
     }
 
@@ -62,6 +68,12 @@ impl ViewMap {
             inside.get(self.identity[i] as usize).copied().unwrap_or(false)
         })
     }
+}
+
+/// Settings for drawing identities. A file may say anything, so a blur counts only if it is one that may be found.
+fn settings_for(identities: &Identities, settings: &RenderSettings) -> RenderSettings {
+    let blur = identities.blur_px2.map(f64::from).filter(|b| (LEAST_BLUR_PX2..=BLUR_PX2).contains(b));
+    settings.blurred_by(blur.unwrap_or(settings.blur_px2))
 }
 
 /// The object of each identity.
@@ -101,5 +113,33 @@ mod tests {
         let back = Camera::look_at(DVec3::new(0.0, 0.0, 3.0), DVec3::ZERO, DVec3::NEG_Y, 0.6, 50, 37).expect("valid");
         let map = ViewMap::render(&mut renderer, &cloud, &[front, behind], &all, &back, &settings).expect("drawn");
         assert!(map.mask(&all, front).is_empty());
+    }
+
+    #[test]
+    fn a_line_thinner_than_a_pixel_keeps_its_pixels() {
+        let mut all = Identities::default();
+        let (wall, line) = (all.add(Level::Object, NO_IDENTITY, vec![]), all.add(Level::Object, NO_IDENTITY, vec![]));
+        let camera =
+            Camera::look_at(DVec3::new(0.0, 0.0, -2.0), DVec3::ZERO, DVec3::NEG_Y, 0.6, 51, 37).expect("valid");
+        // Its deviation is 0.3 px, and its middle that of a column of pixels.
+        let width = (0.3 * 2.0 / camera.focal_px.x).ln() as f32;
+        let cloud = GaussianCloud {
+            log_scales: vec![[width, -1.8, width], [1.0; 3]],
+            ..GaussianCloud::isotropic(vec![[0.0; 3], [0.0, 0.0, 1.0]], 0.0, 6.0)
+        };
+        let (of, mut renderer) = ([line, wall], Renderer::new());
+        let settings = RenderSettings { antialias: true, ..RenderSettings::default() };
+        let mut columns = |all: &Identities| -> Vec<usize> {
+            let map = ViewMap::render(&mut renderer, &cloud, &of, all, &camera, &settings).expect("drawn");
+            map.mask(all, line).pixels().map(|i| i % 51).collect()
+        };
+        assert!(columns(&all).is_empty(), "the control: with the blur of pictures, nothing of it is left");
+        all.blur_px2 = Some(0.2);
+        let found = columns(&all);
+        assert!(found.len() > 10 && found.iter().all(|x| *x == 25), "{found:?}");
+        for nonsense in [f32::NAN, -1.0, 0.0, 1e9] {
+            all.blur_px2 = Some(nonsense);
+            assert!(columns(&all).is_empty(), "as without one");
+        }
     }
 }

@@ -2,7 +2,7 @@
 
 use crate::math::number::Number;
 use crate::math::{Real, rotation, sh};
-use crate::render::{BLUR_PX2, COLOR_MAX, TANGENT_CLAMP};
+use crate::render::{COLOR_MAX, RenderSettings, TANGENT_CLAMP};
 use crate::scene::{Camera, Gaussian};
 
 /// A camera in the renderer's precision, relative to a cloud's origin.
@@ -19,13 +19,15 @@ pub struct CameraView<R> {
     /// Largest tangent of the viewing angle at which the projection is linearized, per axis.
     pub(crate) clamp: [R; 2],
     pub(crate) near: R,
+    /// Variance added to each splat along both picture axes, px².
+    blur_px2: R,
     /// Picture size in px.
     pub(crate) size: [usize; 2],
 }
 
 impl<R: Real> CameraView<R> {
     /// The view of `camera` on a cloud with this origin.
-    pub fn new(camera: &Camera, origin: glam::DVec3, near: f64) -> Self {
+    pub fn new(camera: &Camera, origin: glam::DVec3, settings: &RenderSettings) -> Self {
         let m = camera.world_from_camera;
         let row = |a: glam::DVec3| [R::of(a.x), R::of(a.y), R::of(a.z)];
         let half = [f64::from(camera.width_px) * 0.5, f64::from(camera.height_px) * 0.5];
@@ -38,7 +40,8 @@ impl<R: Real> CameraView<R> {
                 R::of(TANGENT_CLAMP * half[0] / camera.focal_px.x),
                 R::of(TANGENT_CLAMP * half[1] / camera.focal_px.y),
             ],
-            near: R::of(near),
+            near: R::of(settings.near),
+            blur_px2: R::of(settings.blur_px2),
             size: [camera.width_px as usize, camera.height_px as usize],
         }
     }
@@ -149,7 +152,7 @@ pub(crate) fn ellipse<N: Number>(
         }
     }
     let [u, v] = factor;
-    let blur = same(N::Of::of(BLUR_PX2));
+    let blur = same(view.blur_px2);
     let (uu, uv, vv) = (dot(u, u), dot(u, v), dot(v, v));
     // Lagrange's identity keeps the determinant positive where `uu vv - uv²` would cancel.
     let cross = [u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]];

@@ -156,7 +156,7 @@ impl<R: Real, P: Primitive<R>> CpuRasterizer<R, P> {
         let cut = self.cut.as_deref().filter(|cut| cut.fits(cloud));
         let extra = features.channels;
         let channels = P::padded(P::channels(extra, settings.depth));
-        let view = CameraView::new(camera, cloud.origin, settings.near);
+        let view = CameraView::new(camera, cloud.origin, settings);
         let SplatLists { parts, kept, tiles } = &mut self.lists;
         let mut clock = Instant::now();
         // Nodes that stand for the same Gaussian cannot be told apart from picture to picture.

@@ -71,7 +71,8 @@ twins! {
         /// 1 = anti-aliasing compensation.
         antialias: u32,
         channels: u32,
-        pad0: u32,
+        /// Variance added to each splat along both picture axes, px².
+        blur: f32,
     }
 
     /// A Gaussian in the picture; see `shaders/shared/splat.wgsl`.

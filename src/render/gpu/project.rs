@@ -84,7 +84,7 @@ pub(crate) fn view(
         near: settings.near as f32,
         antialias: u32::from(settings.antialias),
         channels,
-        pad0: 0,
+        blur: settings.blur_px2 as f32,
     }
 }
 

@@ -6,7 +6,7 @@ use std::fmt::Write;
 use super::GpuError;
 use super::layout::ROW_PX;
 use crate::render::cpu::labels::{COMPETITORS, UNKNOWN};
-use crate::render::{ALPHA_MAX, ALPHA_MIN, BLUR_PX2, COLOR_MAX, TILE_PX, TRANSMITTANCE_MIN};
+use crate::render::{ALPHA_MAX, ALPHA_MIN, COLOR_MAX, TILE_PX, TRANSMITTANCE_MIN};
 
 macro_rules! files {
     ($($name:literal),* $(,)?) => {
@@ -95,7 +95,6 @@ fn constants(variant: ShaderVariant) -> String {
     let floats = [
         ("ALPHA_MIN", ALPHA_MIN),
         ("ALPHA_MAX", ALPHA_MAX),
-        ("BLUR_PX2", BLUR_PX2),
         ("COLOR_MAX", COLOR_MAX),
         ("TRANSMITTANCE_MIN", TRANSMITTANCE_MIN),
     ];

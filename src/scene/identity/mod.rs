@@ -84,6 +84,9 @@ pub struct Identities {
     /// Names of what was removed from the scene for good.
     #[serde(default, skip_serializing_if = "Vec::is_empty", deserialize_with = "text::read_names")]
     pub(crate) removed: Vec<String>,
+    /// Blur with which labels were found to be drawn best, px²; `None` = that of pictures.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(crate) blur_px2: Option<f32>,
     /// Color of each, once computed from its Gaussians.
     #[serde(skip)]
     pub(crate) colors: SeenColors,

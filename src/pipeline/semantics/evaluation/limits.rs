@@ -81,7 +81,8 @@ pub(crate) fn rows(
     settings: &RenderSettings,
 ) -> Result<Vec<LimitRow>, DrawError> {
     let mut renderer = Renderer::new();
-    let truth = TrueLabels::vote(&mut renderer, views, cloud, settings)?;
+    let mut truth = TrueLabels::vote(&mut renderer, views, cloud, settings)?;
+    truth.identities.blur_px2 = scene.map.identities.blur_px2;
     let (kinds, kind_of) = evidence(scene.map);
     let mut units = Vec::new();
     for view in views {

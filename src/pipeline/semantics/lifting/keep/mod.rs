@@ -26,6 +26,7 @@ pub(crate) fn joined(found: &SemanticMap, kept: &SemanticMap) -> SemanticMap {
     let twin = twins(found, kept);
     let is_gone = |id: IdentityId| twin[id as usize] != NO_IDENTITY;
     let mut identities = old.clone();
+    identities.blur_px2 = all.blur_px2;
     identities.add_removed(all.removed.iter().cloned());
     // New numbers of the found identities; for one that is gone, that of the next larger one that is not.
     let mut number = vec![NO_IDENTITY; all.len() + 1];

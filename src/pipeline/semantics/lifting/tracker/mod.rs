@@ -6,6 +6,7 @@ mod complete;
 mod gone;
 mod growth;
 mod options;
+mod sharpness;
 mod tracked;
 mod views;
 
@@ -83,13 +84,13 @@ pub(crate) fn track(
         },
         conflicts: Vec::new(),
         masks: Vec::new(),
+        told: Vec::new(),
         segment_secs: 0.0,
         secs: CarrySeconds::default(),
     };
     let (start, mut follow_secs, mut encode_secs) = (Instant::now(), 0.0, 0.0);
     t.see(observer)?;
-    let mut seeds = vec![first];
-    let mut tried = vec![false; photos.len()];
+    let (mut seeds, mut tried) = (vec![first], vec![false; photos.len()]);
     let seeded = t.seed(first, segmenter, observer)?;
     tried[first] = true;
     if let (Some(follower), Some((found, ids))) = (follower, seeded) {
@@ -151,6 +152,7 @@ pub(crate) fn track(
             }
         }
     }
+    t.identities.blur_px2 = t.best_blur(&identities_of(&assignments))?;
     let told = ConflictKind::summary(&t.conflicts, |i| photos[i].name.clone(), |id| t.identities.full_name(id));
     told.into_iter().for_each(|text| observer.note(Severity::Warning, text));
     let models = [("segment", t.segment_secs), ("encode frames", encode_secs), ("follow masks", follow_secs)];
@@ -176,6 +178,8 @@ struct Tracker<'a> {
     votes: Votes,
     conflicts: Vec<(usize, ConflictKind)>,
     masks: Vec<CodeView>,
+    /// Segmented photos, a few, and their labels.
+    told: Vec<(usize, Vec<IdentityId>)>,
     segment_secs: f64,
     secs: CarrySeconds,
 }
@@ -273,6 +277,7 @@ impl Tracker<'_> {
             .add_view(self.renderers.one(), self.cloud, &camera, self.settings, &labels)
             .map_err(|e| undrawn(&self.photos[photo], e))?;
         self.keep(photo, (camera.width_px, camera.height_px), &labels);
+        self.tell(photo, labels);
         Ok(Some((found, ids)))
     }
 
