@@ -6,12 +6,13 @@ use glam::{DMat3, DQuat, DVec3};
 
 use super::extent::{Ball, ThingExtent};
 use super::plane::{self, Plane};
-use super::rebuild::{Invented, SPREAD, shown};
+use super::rebuild::{NewGaussian, SPREAD, shown};
 use super::shade::{Brightening, Occluder};
 use super::sheet::{SurfaceTexture, Texel};
 use super::views::{self, SeenView};
 use super::{ClosedSurface, Paint, RemovalError, RemovalOptions, RemovalReport};
 use crate::math::grid;
+use crate::math::rotation::matrix_from_quaternion;
 use crate::models::lama::Lama;
 use crate::pipeline::observer::{Observer, Ticker};
 use crate::scene::{GaussianCloud, IdentityId, NO_IDENTITY, SemanticMap};
@@ -24,6 +25,8 @@ const REACH: f64 = 3.0;
 const SHADING_REACH: f64 = 6.0;
 /// Radius of an occluder of light, in standard deviations.
 const FOOTPRINT: f64 = 1.5;
+/// Distance across a surface at which a Gaussian below it shows through, in standard deviations.
+const PIERCING: f64 = 2.0;
 
 /// Inputs for finding and closing the surfaces.
 pub(super) struct HoleFilling<'a> {
@@ -44,7 +47,7 @@ impl HoleFilling<'_> {
         report: &mut RemovalReport,
         mut network: Option<&mut Lama>,
         observer: &mut dyn Observer,
-    ) -> Result<Vec<Invented>, RemovalError> {
+    ) -> Result<Vec<NewGaussian>, RemovalError> {
         let points = views::around(self.seen, &self.ball, REACH);
         let toward = self.seen.iter().map(|v| v.camera.center).sum::<DVec3>() / self.seen.len() as f64;
         let planes = plane::planes(&points, toward, self.ball.radius, PLANES, self.options.seed);
@@ -64,13 +67,17 @@ impl HoleFilling<'_> {
             }
             let Some(mut sheet) = wide.hidden_part(&self.ball, self.seen) else { continue };
             if let Some(brightening) = &brightening {
-                sheet.brighten(|point, rgb| brightening.at(point, rgb));
+                let owners = self.owners(&sheet, plane, gone);
+                let of = self.main_object(&sheet, &owners);
+                let own = |i: usize| Some(self.map.identities.object_of(owners[i])) == of;
+                sheet.brighten(own, |point, rgb| brightening.at(point, rgb));
             }
             if self.options.halo {
                 sheet.add_foot();
             }
             sheet.paint(self.paint, self.options.seed, network.as_deref_mut())?;
-            let hole = sheet.hole().count();
+            let drawn: Vec<(usize, bool)> = sheet.drawn().collect();
+            let hole = drawn.iter().filter(|d| d.1).count();
             let area = hole as f64 * sheet.step * sheet.step;
             report.surfaces.push(ClosedSurface {
                 gaussians: hole,
@@ -78,6 +85,7 @@ impl HoleFilling<'_> {
                 unevenness: plane.residual,
                 roughness: plane.residual / area.sqrt(),
             });
+            report.redrawn += drawn.len() - hole;
             let owners = self.owners(&sheet, plane, gone);
             for (i, gone) in gone.iter_mut().enumerate() {
                 if !*gone && self.is_left_over(i, plane, &sheet, &owners) {
@@ -86,12 +94,13 @@ impl HoleFilling<'_> {
                 }
             }
             let rotation = DQuat::from_mat3(&DMat3::from_cols(plane.u, plane.v, plane.normal));
-            new.extend(sheet.hole().map(|i| Invented {
+            new.extend(drawn.into_iter().map(|(i, is_invented)| NewGaussian {
                 position: sheet.center(i),
                 rotation,
                 scale: sheet.step * SPREAD,
                 rgb: sheet.color[i],
                 identity: owners[i],
+                is_invented,
             }));
         }
         Ok(new)
@@ -110,13 +119,16 @@ impl HoleFilling<'_> {
         };
         let occluders: Vec<Occluder> = (0..cloud.len()).filter_map(occluder).collect();
         let owners = self.owners(wide, plane, gone);
-        let object = |i: usize| self.map.identities.object_of(owners[i]);
+        let of = self.main_object(wide, &owners)?;
+        Brightening::find(plane, wide, |i| self.map.identities.object_of(owners[i]) == of, &occluders)
+    }
+
+    /// Returns the object that most of the seen texels belong to.
+    fn main_object(&self, sheet: &SurfaceTexture<'_>, owners: &[IdentityId]) -> Option<IdentityId> {
         let mut count: HashMap<IdentityId, usize> = HashMap::new();
-        (0..owners.len())
-            .filter(|i| wide.state[*i] == Texel::Seen)
-            .for_each(|i| *count.entry(object(i)).or_default() += 1);
-        let most = count.into_iter().max_by_key(|(id, n)| (*n, *id))?.0;
-        Brightening::find(plane, wide, |i| object(i) == most, &occluders)
+        let seen = owners.iter().zip(&sheet.state).filter(|(_, state)| **state == Texel::Seen);
+        seen.for_each(|(id, _)| *count.entry(self.map.identities.object_of(*id)).or_default() += 1);
+        count.into_iter().max_by_key(|(id, n)| (*n, *id)).map(|most| most.0)
     }
 
     /// Returns whether a Gaussian is a piece of a surface, which is seen at its near side.
@@ -125,27 +137,41 @@ impl HoleFilling<'_> {
         plane.height(self.cloud.world_position(i)).abs() <= plane.tolerance + f64::from(thickness)
     }
 
-    /// Returns whether a Gaussian belongs to the thing by its place: on the hidden part of the surface, where it is
-    /// unseen and would shine through, or between that and the thing's own surface. Gaussians of another object than
-    /// the surface's, such as an apple in a bowl, do not.
+    /// Returns the standard deviation of a Gaussian across a surface, scene units.
+    fn deviation_across(&self, plane: &Plane, i: usize) -> f64 {
+        let Some(axes) = matrix_from_quaternion(self.cloud.quaternions[i].map(f64::from)) else { return 0.0 };
+        let normal = plane.normal.to_array();
+        let along = |k: usize| (0..3).map(|row| axes[row][k] * normal[row]).sum::<f64>();
+        (0..3).map(|k| (f64::from(self.cloud.log_scales[i][k].exp()) * along(k)).powi(2)).sum::<f64>().sqrt()
+    }
+
+    /// Returns whether a Gaussian has to go by its place: on a part of the surface that is drawn anew, below it so that
+    /// it would show through, or between a hidden part and the thing's own surface. Gaussians of another object than
+    /// the surface's, such as an apple in a bowl, stay.
     fn is_left_over(&self, i: usize, plane: &Plane, sheet: &SurfaceTexture<'_>, owners: &[IdentityId]) -> bool {
         let at = self.cloud.world_position(i);
-        let Some(texel) = sheet.texel(at).filter(|t| sheet.state[*t] == Texel::Hidden) else { return false };
+        let Some(texel) = sheet.texel(at).filter(|t| sheet.state[*t].is_drawn()) else { return false };
+        let object = |id: IdentityId| self.map.identities.object_of(id);
+        let (of, height) = (object(self.map.identity_of[i]), plane.height(at));
+        let is_others = of != NO_IDENTITY && of != object(owners[texel]);
+        if is_others && sheet.state[texel] == Texel::Shaded {
+            return false;
+        }
+        if height < 0.0 && height + PIERCING * self.deviation_across(plane, i) > 0.0 && sheet.is_deep(texel) {
+            return true;
+        }
         if self.lies_on(plane, i) {
             let largest = self.cloud.log_scales[i].iter().fold(f32::NEG_INFINITY, |a, b| a.max(*b)).exp();
             // A large Gaussian at the border covers the area beside it.
             return sheet.is_deep(texel) || f64::from(largest) < sheet.step;
         }
-        let object = |id: IdentityId| self.map.identities.object_of(id);
-        let of = object(self.map.identity_of[i]);
-        let above = plane.height(at) > 0.0 && self.extent.contains(at);
-        above && (of == NO_IDENTITY || of == object(owners[texel]))
+        height > 0.0 && self.extent.contains(at) && !is_others
     }
 
     /// Returns the identity of each texel: that of the nearest Gaussian on the surface.
     fn owners(&self, sheet: &SurfaceTexture, plane: &Plane, gone: &[bool]) -> Vec<IdentityId> {
         let on_it = (0..self.cloud.len()).filter(|i| !gone[*i]).filter_map(|i| {
-            let texel = sheet.texel(self.cloud.world_position(i)).filter(|t| sheet.state[*t] == Texel::Seen)?;
+            let texel = sheet.texel(self.cloud.world_position(i)).filter(|t| sheet.state[*t].is_surface())?;
             self.lies_on(plane, i).then_some((texel, self.map.identity_of[i]))
         });
         let found = grid::spread(sheet.size[0], sheet.state.len(), on_it, |_| true);

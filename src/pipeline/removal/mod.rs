@@ -7,8 +7,9 @@
 //! ([`sheet`]). Hidden texels are painted from the seen ones ([`paint`]) and become flat Gaussians of their own. The
 //! texture is painted on the surface, not in a view, so all views agree.
 //!
-//! The object's shadow on a flat surface is lifted, as far as its blocking of the light explains it ([`shade`]). Its
-//! other shadows, reflections, and light that it reflects stay.
+//! The object's shadow on a flat surface is lifted, as far as its blocking of the light explains it ([`shade`]). Where
+//! the shadow is deep, the surface is drawn anew from the photos' lifted colors, or painted. The object's other shadows,
+//! reflections, and light that it reflects stay.
 //!
 //! New Gaussians are marked as invented in the cloud. The scene from which a thing is removed is never written to.
 
@@ -84,8 +85,11 @@ pub(crate) struct RemovalReport {
     pub(crate) fringes: usize,
     /// Gaussians that no photo shows and that would be visible now.
     pub(crate) unseen: usize,
-    /// Gaussians counted to the object by position: on the closed surfaces, and between them and the object.
+    /// Gaussians that go by position: on the surfaces that are drawn anew, at their back, and between them and the
+    /// object.
     pub(crate) left_over: usize,
+    /// New Gaussians of surfaces that the photos show, in the deep shadow of the object.
+    pub(crate) redrawn: usize,
     /// Gaussians that were brightened to lift the shadow.
     pub(crate) brightened: usize,
     pub(crate) surfaces: Vec<ClosedSurface>,

@@ -22,18 +22,20 @@ const THICKNESS: f64 = 0.1;
 /// Opacity of 0.95, before the sigmoid.
 const OPACITY_LOGIT: f32 = 2.944;
 
-/// Gaussian that closes a piece of a surface.
-pub(super) struct Invented {
+/// Gaussian of a piece of a surface.
+pub(super) struct NewGaussian {
     pub(super) position: DVec3,
     pub(super) rotation: DQuat,
     /// Standard deviation along the surface, scene units.
     pub(super) scale: f64,
     pub(super) rgb: [f32; 3],
     pub(super) identity: IdentityId,
+    /// False if the photos show this piece.
+    pub(super) is_invented: bool,
 }
 
 /// Returns the Gaussians at `kept`, and the new ones.
-pub(super) fn with_new(cloud: &GaussianCloud, kept: &[usize], new: &[Invented]) -> GaussianCloud {
+pub(super) fn with_new(cloud: &GaussianCloud, kept: &[usize], new: &[NewGaussian]) -> GaussianCloud {
     let mut all = cloud.select(kept);
     if !all.extras.iter().any(|e| e.name == INVENTED) {
         all.extras.push(ExtraProperty { name: INVENTED.into(), values: vec![0.0; kept.len()] });
@@ -49,8 +51,8 @@ pub(super) fn with_new(cloud: &GaussianCloud, kept: &[usize], new: &[Invented]) 
         all.sh.extend(std::iter::repeat_n([0.0; 3], stride - 1));
     }
     for extra in &mut all.extras {
-        let value = if extra.name == INVENTED { 1.0 } else { 0.0 };
-        extra.values.resize(kept.len() + new.len(), value);
+        let is_flag = extra.name == INVENTED;
+        extra.values.extend(new.iter().map(|one| f32::from(u8::from(is_flag && one.is_invented))));
     }
     all
 }

@@ -29,6 +29,13 @@ const RIM: usize = 2;
 
 /// Reach of the thing's foot and its shadow around a hole, as a share of the hole's diameter.
 const FOOT: f64 = 0.25;
+/// Gains from which seen texels are drawn anew, since Gaussians there mix surface, shadow and thing, and from which they
+/// are painted, since their color is mostly light off the thing.
+const DRAWN_ANEW: f32 = 1.5;
+const PAINTED: f32 = 3.0;
+/// Least texels of empty space with an edge of the surface, and texels beside it that are not drawn anew.
+const OPEN: usize = 30;
+const EDGE: usize = 3;
 /// Least difference of a foot's color from the surface, absolute and as a multiple of the surface's own variation.
 const DIFFERENT: (f32, f32) = (0.03, 4.0);
 
@@ -39,10 +46,24 @@ pub(super) enum Texel {
     Unknown,
     /// Surface is seen.
     Seen,
+    /// Surface is seen, in the thing's deep shadow.
+    Shaded,
     /// Empty: the photos look through it.
     Free,
     /// Hidden by the thing in all of them.
     Hidden,
+}
+
+impl Texel {
+    /// Returns whether the photos show the surface.
+    pub(super) fn is_surface(self) -> bool {
+        matches!(self, Self::Seen | Self::Shaded)
+    }
+
+    /// Returns whether it becomes a Gaussian.
+    pub(super) fn is_drawn(self) -> bool {
+        matches!(self, Self::Hidden | Self::Shaded)
+    }
 }
 
 /// Texels in row-major order.
@@ -56,7 +77,7 @@ pub(super) struct SurfaceTexture<'a> {
     pub(super) state: Vec<Texel>,
     /// Colors of seen texels; after painting, of hidden ones as well.
     pub(super) color: Vec<[f32; 3]>,
-    /// Hidden texels with none but hidden ones around them.
+    /// Drawn texels with none but drawn ones around them.
     deep: Vec<bool>,
 }
 
@@ -135,8 +156,14 @@ impl<'a> SurfaceTexture<'a> {
         self.state.iter().map(|s| *s == Texel::Hidden).collect()
     }
 
+    /// Returns the texels for which `is` holds and their neighbors, as far as they belong to the surface.
+    fn with_seam(&self, is: impl Fn(Texel) -> bool) -> Vec<bool> {
+        let grown = grid::grown(self.size[0], self.state.iter().map(|s| is(*s)).collect(), 1);
+        grown.iter().zip(&self.state).map(|(is, s)| *is && (s.is_surface() || *s == Texel::Hidden)).collect()
+    }
+
     fn find_deep(&mut self) {
-        let open = self.state.iter().map(|s| *s != Texel::Hidden).collect();
+        let open = self.state.iter().map(|s| !s.is_drawn()).collect();
         self.deep = grid::grown(self.size[0], open, RIM).iter().map(|open| !open).collect();
     }
 
@@ -147,7 +174,7 @@ impl<'a> SurfaceTexture<'a> {
         let hidden = self.hidden();
         let steps = (FOOT * (hidden.iter().filter(|h| **h).count() as f64).sqrt()).ceil() as usize;
         let beside = grid::grown(width, hidden.clone(), steps);
-        let known: Vec<bool> = (0..n).map(|i| self.state[i] == Texel::Seen && !beside[i]).collect();
+        let known: Vec<bool> = (0..n).map(|i| self.state[i].is_surface() && !beside[i]).collect();
         let expected = paint::smooth(&self.color, self.size, &known, &beside);
         let off = |i: usize| (0..3).map(|c| (self.color[i][c] - expected[i][c]).abs()).fold(0.0, f32::max);
         let usual: Vec<f64> = (0..n).filter(|i| known[*i]).map(|i| f64::from(off(i))).collect();
@@ -157,7 +184,7 @@ impl<'a> SurfaceTexture<'a> {
         let limit = DIFFERENT.0.max(DIFFERENT.1 * median(&usual) as f32);
         // Low parts of things hide the surface there, too.
         let is_foot = |i: usize| match self.state[i] {
-            Texel::Seen => beside[i] && off(i) > limit,
+            Texel::Seen | Texel::Shaded => beside[i] && off(i) > limit,
             Texel::Unknown => beside[i],
             _ => false,
         };
@@ -197,11 +224,21 @@ impl<'a> SurfaceTexture<'a> {
         Some(sum)
     }
 
-    /// Makes the seen texels brighter.
-    pub(super) fn brighten(&mut self, gain: impl Fn(DVec3, [f32; 3]) -> [f32; 3]) {
-        for i in (0..self.state.len()).filter(|i| self.state[*i] == Texel::Seen).collect::<Vec<_>>() {
-            self.color[i] = brighter(self.color[i], gain(self.center(i), self.color[i]));
+    /// Makes the seen texels brighter. Those of the surface itself, `own`, change their state in deep shadow.
+    pub(super) fn brighten(&mut self, own: impl Fn(usize) -> bool, gain: impl Fn(DVec3, [f32; 3]) -> [f32; 3]) {
+        let (width, n) = (self.size[0], self.state.len());
+        let (label, areas) = grid::regions(width, n, |i| self.state[i] == Texel::Free);
+        let open = label.iter().map(|of| *of > 0 && areas[*of as usize - 1] >= OPEN).collect();
+        let edge = grid::grown(width, open, EDGE);
+        for i in (0..n).filter(|i| self.state[*i] == Texel::Seen).collect::<Vec<_>>() {
+            let gain = gain(self.center(i), self.color[i]);
+            self.color[i] = brighter(self.color[i], gain);
+            let most = gain.into_iter().fold(1.0, f32::max);
+            if own(i) && !edge[i] && most >= DRAWN_ANEW {
+                self.state[i] = if most >= PAINTED { Texel::Hidden } else { Texel::Shaded };
+            }
         }
+        self.find_deep();
     }
 
     /// Returns the texel below or above a point.
@@ -211,21 +248,27 @@ impl<'a> SurfaceTexture<'a> {
         inside.then(|| y as usize * self.size[0] + x as usize)
     }
 
-    /// Returns whether a texel and all around it are hidden.
+    /// Returns whether a texel and all around it are drawn.
     pub(super) fn is_deep(&self, texel: usize) -> bool {
         self.deep[texel]
     }
 
-    /// Returns the texels that become Gaussians: the hidden ones, and a seam around them.
-    pub(super) fn hole(&self) -> impl Iterator<Item = usize> + '_ {
-        let grown = grid::grown(self.size[0], self.hidden(), 1);
-        (0..grown.len()).filter(move |&i| grown[i] && matches!(self.state[i], Texel::Hidden | Texel::Seen))
+    /// Returns the texels that become Gaussians: the hidden ones and those in deep shadow, and a seam around them;
+    /// with each, whether it is invented.
+    pub(super) fn drawn(&self) -> impl Iterator<Item = (usize, bool)> {
+        let invented = self.with_seam(|s| s == Texel::Hidden);
+        self.with_seam(Texel::is_drawn)
+            .into_iter()
+            .zip(invented)
+            .enumerate()
+            .filter(|(_, t)| t.0)
+            .map(|(i, t)| (i, t.1))
     }
 
     /// Paints the hidden texels, by the network if there is one.
     pub(super) fn paint(&mut self, how: Paint, seed: u64, network: Option<&mut Lama>) -> Result<(), ModelError> {
         let hole = grid::grown(self.size[0], self.hidden(), RIM);
-        let known: Vec<bool> = (0..hole.len()).map(|i| self.state[i] == Texel::Seen && !hole[i]).collect();
+        let known: Vec<bool> = (0..hole.len()).map(|i| self.state[i].is_surface() && !hole[i]).collect();
         let Some(network) = network else {
             paint::fill(&mut self.color, self.size, &known, &hole, how, seed);
             return Ok(());

@@ -223,3 +223,44 @@ fn what_is_brighter_than_the_surface_is_not_made_brighter() {
     assert!(kept.len() > 3 && done.report.brightened > 100, "{} {}", kept.len(), done.report.brightened);
     assert!(kept.iter().all(|k| done.cloud.sh[*k] == [1.7; 3]), "they are brighter");
 }
+
+#[test]
+fn the_surface_is_drawn_anew_in_deep_shadow_and_is_not_called_invented() {
+    let (bright, map, photos) = scene(false);
+    let cloud = shaded(bright, &map);
+    let run = |lift_shadow: bool| {
+        let options = RemovalOptions { lift_shadow, ..options(Some(Paint::Patches)) };
+        remove(&cloud, &map, &photos, &RenderSettings::default(), &options, None, &mut Silent).expect("removed")
+    };
+    assert_eq!(run(false).report.redrawn, 0);
+    let done = run(true);
+    let flags = invented_flags(&done.cloud).expect("flags");
+    let new = done.kept.len()..done.cloud.len();
+    let invented = new.clone().filter(|i| flags[*i] == 1.0).count();
+    assert_eq!((invented, new.len()), (done.report.invented(), done.report.invented() + done.report.redrawn));
+    let redrawn: Vec<usize> = new.filter(|i| flags[*i] == 0.0).collect();
+    assert!(redrawn.len() > 100, "{}", redrawn.len());
+    let off = |i: &usize| {
+        let (at, rgb) = (done.cloud.world_position(*i), rebuild::shown(&done.cloud, *i));
+        (rgb[0] - (0.5 + 0.15 * at.x as f32)).abs().max((rgb[1] - 0.6).abs())
+    };
+    let mean = redrawn.iter().map(off).sum::<f32>() / redrawn.len() as f32;
+    assert!(mean < 0.05, "{mean} from the table's color");
+}
+
+#[test]
+fn what_shows_through_from_below_goes_and_what_lies_deeper_stays() {
+    let (mut cloud, mut map, photos) = scene(false);
+    let places = [[0.0, -0.1, 0.1], [0.0, -0.8, 0.1], [1.3, -0.1, 0.1]];
+    let mut blobs = GaussianCloud::isotropic(places.to_vec(), 0.08_f32.ln(), 3.0);
+    blobs.sh = vec![[-1.5; 3]; places.len()];
+    let first = cloud.len();
+    cloud.append(blobs);
+    let mut of = map.identity_of.clone();
+    of.extend([TABLE; 3]);
+    map = SemanticMap::from_identities(map.identities, of.clone(), vec![1.0; of.len()], vec![]);
+    let settings = RenderSettings::default();
+    let done = remove(&cloud, &map, &photos, &settings, &options(Some(Paint::Patches)), None, &mut Silent);
+    let kept = done.expect("removed").kept;
+    assert_eq!([0, 1, 2].map(|k| kept.contains(&(first + k))), [false, true, true]);
+}
