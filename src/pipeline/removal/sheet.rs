@@ -29,10 +29,8 @@ const RIM: usize = 2;
 
 /// Reach of the thing's foot and its shadow around a hole, as a share of the hole's diameter.
 const FOOT: f64 = 0.25;
-/// Gains from which seen texels are drawn anew, since Gaussians there mix surface, shadow and thing, and from which they
-/// are painted, since their color is mostly light off the thing.
+/// Gain from which seen texels are drawn anew: Gaussians there mix surface, shadow and thing.
 const DRAWN_ANEW: f32 = 1.5;
-const PAINTED: f32 = 3.0;
 /// Least texels of empty space with an edge of the surface, and texels beside it that are not drawn anew.
 const OPEN: usize = 30;
 const EDGE: usize = 3;
@@ -233,9 +231,8 @@ impl<'a> SurfaceTexture<'a> {
         for i in (0..n).filter(|i| self.state[*i] == Texel::Seen).collect::<Vec<_>>() {
             let gain = gain(self.center(i), self.color[i]);
             self.color[i] = brighter(self.color[i], gain);
-            let most = gain.into_iter().fold(1.0, f32::max);
-            if own(i) && !edge[i] && most >= DRAWN_ANEW {
-                self.state[i] = if most >= PAINTED { Texel::Hidden } else { Texel::Shaded };
+            if own(i) && !edge[i] && gain.iter().any(|g| *g >= DRAWN_ANEW) {
+                self.state[i] = Texel::Shaded;
             }
         }
         self.find_deep();
