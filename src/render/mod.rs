@@ -143,6 +143,7 @@ impl RenderSettings {
     pub(crate) fn blurred_by(&self, blur_px2: f64) -> Self {
         Self { blur_px2, ..self.clone() }
     }
+
     /// Settings for Gaussians of this mode.
     pub(crate) fn of_mode(mode: SplatRenderMode) -> Self {
         let (antialias, surfels) = (mode == SplatRenderMode::Mip, mode == SplatRenderMode::Surfels);

@@ -139,10 +139,10 @@ impl HoleFilling<'_> {
 
     /// Returns the standard deviation of a Gaussian across a surface, scene units.
     fn deviation_across(&self, plane: &Plane, i: usize) -> f64 {
-        let Some(axes) = matrix_from_quaternion(self.cloud.quaternions[i].map(f64::from)) else { return 0.0 };
-        let normal = plane.normal.to_array();
-        let along = |k: usize| (0..3).map(|row| axes[row][k] * normal[row]).sum::<f64>();
-        (0..3).map(|k| (f64::from(self.cloud.log_scales[i][k].exp()) * along(k)).powi(2)).sum::<f64>().sqrt()
+        let Some(rows) = matrix_from_quaternion(self.cloud.quaternions[i].map(f64::from)) else { return 0.0 };
+        let sd = DVec3::from(self.cloud.log_scales[i].map(|s| f64::from(s.exp())));
+        // The rows of the rotation as columns are its inverse.
+        (DMat3::from_cols_array_2d(&rows) * plane.normal * sd).length()
     }
 
     /// Returns whether a Gaussian has to go by its place: on a part of the surface that is drawn anew, below it so that

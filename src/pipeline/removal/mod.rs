@@ -67,7 +67,7 @@ impl RemovalOptions {
 /// Completed surface.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub(crate) struct ClosedSurface {
-    /// New Gaussians.
+    /// New Gaussians of its hidden pieces.
     pub(crate) gaussians: usize,
     /// Their area, square scene units.
     pub(crate) area: f64,
@@ -104,7 +104,7 @@ impl RemovalReport {
         self.removed + self.fringes + self.unseen + self.left_over
     }
 
-    /// New Gaussians.
+    /// New Gaussians of hidden pieces.
     pub(crate) fn invented(&self) -> usize {
         self.surfaces.iter().map(|s| s.gaussians).sum()
     }

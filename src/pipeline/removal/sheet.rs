@@ -29,13 +29,14 @@ const RIM: usize = 2;
 
 /// Reach of the thing's foot and its shadow around a hole, as a share of the hole's diameter.
 const FOOT: f64 = 0.25;
+/// Least difference of a foot's color from the surface, absolute and as a multiple of the surface's own variation.
+const DIFFERENT: (f32, f32) = (0.03, 4.0);
+
 /// Gain from which seen texels are drawn anew: Gaussians there mix surface, shadow and thing.
 const DRAWN_ANEW: f32 = 1.5;
 /// Least texels of empty space with an edge of the surface, and texels beside it that are not drawn anew.
 const OPEN: usize = 30;
 const EDGE: usize = 3;
-/// Least difference of a foot's color from the surface, absolute and as a multiple of the surface's own variation.
-const DIFFERENT: (f32, f32) = (0.03, 4.0);
 
 /// State of a texel by the photos.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
