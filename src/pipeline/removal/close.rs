@@ -21,8 +21,9 @@ use crate::scene::{GaussianCloud, IdentityId, NO_IDENTITY, SemanticMap};
 const PLANES: usize = 4;
 /// Distance around a thing at which surfaces are searched, in its radii.
 const REACH: f64 = 3.0;
-/// Distance up to which occluders of light are considered, in radii of the thing.
-const SHADING_REACH: f64 = 6.0;
+/// Distance up to which the light of a surface is fitted, and up to which occluders are considered, in its radii.
+const LIT_REACH: f64 = 5.0;
+const SHADING_REACH: f64 = 10.0;
 /// Radius of an occluder of light, in standard deviations.
 const FOOTPRINT: f64 = 1.5;
 /// Distance across a surface at which a Gaussian below it shows through, in standard deviations.
@@ -55,7 +56,7 @@ impl HoleFilling<'_> {
         let mut new = Vec::new();
         for (k, plane) in planes.iter().enumerate() {
             ticker.tick(k, observer)?;
-            let wide = SurfaceTexture::around(plane, &self.ball, self.seen, REACH);
+            let wide = SurfaceTexture::around(plane, &self.ball, self.seen, LIT_REACH);
             let brightening = if self.options.lift_shadow { self.brightening(&wide, plane, gone) } else { None };
             if let Some(brightening) = &brightening {
                 for (i, gain) in gains.iter_mut().enumerate() {
@@ -66,16 +67,16 @@ impl HoleFilling<'_> {
                 }
             }
             let Some(mut sheet) = wide.hidden_part(&self.ball, self.seen) else { continue };
+            let owners = self.owners(&sheet, plane, gone);
+            let of = self.main_object(&sheet, &owners);
+            let own: Vec<bool> = owners.iter().map(|id| Some(self.map.identities.object_of(*id)) == of).collect();
             if let Some(brightening) = &brightening {
-                let owners = self.owners(&sheet, plane, gone);
-                let of = self.main_object(&sheet, &owners);
-                let own = |i: usize| Some(self.map.identities.object_of(owners[i])) == of;
-                sheet.brighten(own, |point, rgb| brightening.at(point, rgb));
+                sheet.brighten(&own, |point, rgb| brightening.at(point, rgb));
             }
             if self.options.halo {
                 sheet.add_foot();
             }
-            sheet.paint(self.paint, self.options.seed, network.as_deref_mut())?;
+            sheet.paint(self.paint, &own, self.options.seed, network.as_deref_mut())?;
             let drawn: Vec<(usize, bool)> = sheet.drawn().collect();
             let hole = drawn.iter().filter(|d| d.1).count();
             let area = hole as f64 * sheet.step * sheet.step;
@@ -86,7 +87,6 @@ impl HoleFilling<'_> {
                 roughness: plane.residual / area.sqrt(),
             });
             report.redrawn += drawn.len() - hole;
-            let owners = self.owners(&sheet, plane, gone);
             for (i, gone) in gone.iter_mut().enumerate() {
                 if !*gone && self.is_left_over(i, plane, &sheet, &owners) {
                     *gone = true;
@@ -120,7 +120,9 @@ impl HoleFilling<'_> {
         let occluders: Vec<Occluder> = (0..cloud.len()).filter_map(occluder).collect();
         let owners = self.owners(wide, plane, gone);
         let of = self.main_object(wide, &owners)?;
-        Brightening::find(plane, wide, |i| self.map.identities.object_of(owners[i]) == of, &occluders)
+        let same = |i: usize| self.map.identities.object_of(owners[i]) == of;
+        let near = |i: usize| wide.center(i).distance(self.ball.center) < REACH * self.ball.radius;
+        Brightening::find(plane, wide, same, near, &occluders)
     }
 
     /// Returns the object that most of the seen texels belong to.

@@ -1,11 +1,12 @@
 //! Shadow of a thing on a flat surface, and the brightness of the surface without it.
 //!
 //! A matt surface of one color shows its light minus the occluded light. The occlusion along a direction is known,
-//! because it is made of Gaussians. The light along each direction is fitted to the brightness of the surrounding
-//! surface ([`light`]), first from everywhere, then ever finer about the strongest directions. So the shadow of the
-//! thing is distinguished from those of others, and from stains. Differences that its shadow cannot explain stay.
+//! because it is made of Gaussians. The light along each direction is fitted to the brightness of the surface
+//! ([`light`]), first from everywhere, then ever finer about the strongest directions. Everything around the thing
+//! stands in the same light, so grain and stains, which look like some of the shadows, do not look like all of them.
+//! How strong the thing's own shadow is, is fitted beside it ([`LitChannel`]): light that it reflects makes it weaker.
 
-use glam::DVec3;
+use glam::{DMat2, DVec2, DVec3};
 use rayon::prelude::*;
 
 use super::light;
@@ -23,14 +24,31 @@ const FINER_ROUNDS: usize = 3;
 const MUCH: f64 = 0.06;
 /// Least number of texels of the surface.
 const LEAST_TEXELS: usize = 200;
+/// Most texels that the light is fitted to.
+const MOST_TEXELS: usize = 12_000;
 /// Least share of light that the thing blocks from a texel in its shadow.
 const SHADED: f64 = 0.03;
-/// Largest share of the squared differences in the shadow, beyond the usual ones beside it, that a credible shadow
-/// leaves unexplained.
-const EXPLAINED: f64 = 0.7;
-/// Largest gain of a surface, least visible gain, and least texels of a shadow.
-const MOST: f32 = 6.0;
-const LEAST_GAIN: f32 = 1.03;
+/// Least difference that a shadow makes, root mean square, as a share of the brightness.
+const LEAST_SHADE: f64 = 0.02;
+/// Least number of texels in it, without outliers.
+const LEAST_INSIDE: f64 = 40.0;
+/// Largest share of the squared differences that credible shadows leave unexplained: in the thing's shadow, beyond the
+/// usual ones beside it; or of all things, everywhere.
+const EXPLAINED: (f64, f64) = (0.7, 0.75);
+/// Share of the light from which a direction is strong: its shadows have edges.
+const STRONG: f64 = 0.04;
+/// Least share of light that is left in a shadow.
+const LEAST_LIGHT: f64 = 0.05;
+/// Expected deviation of a shadow's strength from 1, and neighboring texels that differ together, as grain does.
+const DEVIATION: f64 = 0.3;
+const TOGETHER: f64 = 20.0;
+/// Strengths of a shadow from strong and from weak directions. A bright thing may reflect more light than it blocks.
+const STRENGTHS: [(f64, f64); 2] = [(0.0, 2.0), (-0.5, 2.0)];
+/// Rounds of fitting the brightness of the surface and the strengths in turn.
+const STRENGTH_ROUNDS: usize = 4;
+/// Gains of a surface, least visible difference of a gain from 1, and least texels of a shadow.
+const GAINS: (f32, f32) = (0.7, 6.0);
+const LEAST_GAIN: f32 = 0.03;
 const LEAST_SHADED: usize = 12;
 /// Brightest light of a surface: this quantile of its values as a share of the fitted ones, at most the second
 /// number.
@@ -59,44 +77,43 @@ pub(super) struct Brightening<'a> {
 }
 
 impl<'a> Brightening<'a> {
-    /// Finds the shadow; `None` if there is none. `same` = texels of one material.
+    /// Finds the shadow; `None` if there is none. `same` = texels of one material; `near` = those beside the thing.
     pub(super) fn find(
         plane: &Plane,
         sheet: &'a SurfaceTexture<'a>,
         same: impl Fn(usize) -> bool,
+        near: impl Fn(usize) -> bool,
         occluders: &[Occluder],
     ) -> Option<Self> {
-        let rows: Vec<usize> = (0..sheet.state.len()).filter(|&i| sheet.state[i] == Texel::Seen && same(i)).collect();
-        if rows.len() < LEAST_TEXELS || !occluders.iter().any(|o| o.is_thing) {
+        let all: Vec<usize> = (0..sheet.state.len()).filter(|&i| sheet.state[i] == Texel::Seen && same(i)).collect();
+        let beside: Vec<usize> = all.iter().copied().filter(|i| near(*i)).collect();
+        if beside.len() < LEAST_TEXELS || !occluders.iter().any(|o| o.is_thing) {
             return None;
         }
-        let channel =
-            |c: usize| -> Vec<f32> { rows.iter().map(|&i| srgb::linear(sheet.color[i][c].max(0.0))).collect() };
-        let channels = [0, 1, 2].map(channel);
-        let values: Vec<f32> = (0..rows.len()).map(|k| channels.iter().map(|c| c[k]).sum::<f32>() / 3.0).collect();
+        let part = MOST_TEXELS as f64 / all.len() as f64;
+        let rows = all.into_iter().filter(|i| scattered(*i) < part).collect();
         let lit = LitSurface { plane, sheet, occluders, rows };
+        let channels = [0, 1, 2].map(|c| sheet.linear(&lit.rows, c));
+        let values: Vec<f32> = (0..lit.rows.len()).map(|k| channels.iter().map(|c| c[k]).sum::<f32>() / 3.0).collect();
         let (about, counts) = lit.directions(&values);
-        if !lit.is_explained(&about, &values, &counts) {
+        let columns = lit.columns(&about, THING | OTHERS);
+        let mean = light::solve(&columns, &values, &counts);
+        if !lit.is_explained(&about, &values, (&columns, &mean), &counts) {
             return None;
         }
-        let all = lit.columns(&about, THING | OTHERS);
-        let found: [(Vec<f32>, Vec<f32>); 3] = channels.map(|values| {
-            let weights = light::solve(&all, &values, &counts);
-            let floor = 0.05 * weights[0].max(1e-6);
-            let [with, without] =
-                [THING | OTHERS, OTHERS].map(|which| lit.brightness(&about, &weights, which)).map(|all| {
-                    let above = |v: f64| v.max(floor);
-                    all.into_iter().map(above).collect::<Vec<f64>>()
-                });
-            let of_fit: Vec<f64> = lit.rows.iter().zip(&values).map(|(i, v)| f64::from(*v) / with[*i]).collect();
-            let brightest = quantile(&of_fit, BRIGHTEST.0).clamp(1.0, BRIGHTEST.1);
-            let gain = with.iter().zip(&without).map(|(w, o)| ((o / w) as f32).clamp(1.0, MOST)).collect();
-            (blurred(gain, sheet.size), without.iter().map(|o| (o * brightest) as f32).collect())
+        let total: f64 = mean[light::FREE..].iter().sum();
+        let is_strong: Vec<bool> = mean[light::FREE..].iter().map(|w| *w > STRONG * total).collect();
+        let found = [0, 1, 2].map(|c| {
+            let weights = light::solve(&columns, &channels[c], &counts);
+            let shares = lit.shares(&weights);
+            let blocked = blocked_light(&about, &shares, &is_strong, sheet.state.len());
+            LitChannel { sheet, rows: &beside, values: sheet.linear(&beside, c), blocked }.without_thing()
         });
-        let n = sheet.state.len();
-        let gain = |i: usize| Some([0, 1, 2].map(|c| found[c].0[i])).filter(|g| g.iter().any(|g| *g >= LEAST_GAIN));
-        let gain: Vec<[f32; 3]> = (0..n).map(|i| gain(i).unwrap_or([1.0; 3])).collect();
-        let bound = (0..n).map(|i| [0, 1, 2].map(|c| found[c].1[i])).collect();
+        let gain = |i: usize| [0, 1, 2].map(|c| found[c].0[i]);
+        let is_visible = |i: usize| near(i) && gain(i).iter().any(|g| (g - 1.0).abs() >= LEAST_GAIN);
+        let gain: Vec<[f32; 3]> =
+            (0..sheet.state.len()).map(|i| if is_visible(i) { gain(i) } else { [1.0; 3] }).collect();
+        let bound = (0..sheet.state.len()).map(|i| [0, 1, 2].map(|c| found[c].1[i])).collect();
         // Fewer texels are noise.
         (gain.iter().filter(|g| **g != [1.0; 3]).count() >= LEAST_SHADED).then_some(Self { sheet, gain, bound })
     }
@@ -158,41 +175,128 @@ impl LitSurface<'_> {
         base.chain(shadows.iter().map(shade)).collect()
     }
 
-    /// Returns the brightness of each texel, with the occluders `which`.
-    fn brightness(&self, about: &[Shadow], weights: &[f64], which: u8) -> Vec<f64> {
-        let at = |i: usize| {
-            let base: f64 = base(self.sheet, i).iter().zip(weights).map(|(b, w)| b * w).sum();
-            let less = |(s, w): (&Shadow, &f64)| if s.bits[i] & which == 0 { 0.0 } else { *w };
-            base - about.iter().zip(&weights[light::FREE..]).map(less).sum::<f64>()
-        };
-        (0..self.sheet.state.len()).map(at).collect()
-    }
-
-    /// Returns whether the thing's shadow explains the darker texels in it.
-    fn is_explained(&self, about: &[Shadow], values: &[f32], counts: &[f64]) -> bool {
-        let [all, others] = [THING | OTHERS, OTHERS].map(|which| self.columns(about, which));
-        let weights = light::solve(&all, values, counts);
-        let [with, without] = [THING | OTHERS, OTHERS].map(|which| self.brightness(about, &weights, which));
-        let in_shadow = |k: &usize| {
-            let i = self.rows[*k];
-            without[i] - with[i] > SHADED * without[i].abs()
-        };
-        let inside: Vec<bool> = (0..self.rows.len()).map(|k| in_shadow(&k)).collect();
+    /// Returns whether the thing's shadow explains the darker texels in it, or all shadows those of the surface.
+    fn is_explained(
+        &self,
+        about: &[Shadow],
+        values: &[f32],
+        (all, weights): (&[Vec<f32>], &[f64]),
+        counts: &[f64],
+    ) -> bool {
+        let inside: Vec<bool> = self
+            .rows
+            .iter()
+            .map(|&i| {
+                let shade = |s: (&Shadow, &f64)| if s.0.bits[i] == THING { *s.1 } else { 0.0 };
+                let dark: f64 = about.iter().zip(&weights[light::FREE..]).map(shade).sum();
+                dark > SHADED * unshaded(self.sheet, i, weights).abs()
+            })
+            .collect();
         // Sums the weighted squares of the rows inside the shadow, or outside of it, and their weights.
         let squares = |off: &[f64], is: bool| -> (f64, f64) {
             let of = (0..off.len()).filter(|k| inside[*k] == is);
             of.fold((0.0, 0.0), |(sum, n), k| (sum + counts[k] * off[k] * off[k], n + counts[k]))
         };
-        let with = light::residuals(&all, values, &weights);
+        let with = light::residuals(all, values, weights);
         // Grain exists in the shadow and beside it.
         let (beside, of) = squares(&with, false);
         let left = |off: &[f64]| -> f64 {
             let (sum, n) = squares(off, true);
             (sum - n * beside / of.max(1.0)).max(0.0)
         };
-        let full = left(&with);
+        let others = self.columns(about, OTHERS);
         let bare = left(&light::residuals(&others, values, &light::solve(&others, values, counts)));
-        bare > 0.0 && full < EXPLAINED * bare
+        let least = squares(&vec![LEAST_SHADE * self.level(weights); values.len()], true);
+        if least.1 < LEAST_INSIDE || bare < least.0 {
+            return false;
+        }
+        let sum = |off: &[f64]| -> f64 { off.iter().zip(counts).map(|(off, n)| n * off * off).sum() };
+        let even = &all[..light::FREE];
+        let without = sum(&light::residuals(even, values, &light::solve(even, values, counts)));
+        left(&with) < EXPLAINED.0 * bare || sum(&with) < EXPLAINED.1 * without
+    }
+
+    /// Returns the mean brightness without shadows.
+    fn level(&self, weights: &[f64]) -> f64 {
+        let sum: f64 = self.rows.iter().map(|&i| unshaded(self.sheet, i, weights)).sum();
+        (sum / self.rows.len() as f64).max(f64::from(DARK))
+    }
+
+    /// Returns the light of each direction as a share of the mean brightness without shadows.
+    fn shares(&self, weights: &[f64]) -> Vec<f64> {
+        let level = self.level(weights);
+        weights[light::FREE..].iter().map(|w| w / level).collect()
+    }
+}
+
+/// Returns the shares of light that are blocked at each texel: by others; by the thing alone, from strong and from
+/// weak directions.
+fn blocked_light(shadows: &[Shadow], shares: &[f64], is_strong: &[bool], n: usize) -> Vec<[f64; 3]> {
+    let mut blocked = [(); 3].map(|()| vec![0.0_f32; n]);
+    for ((shadow, share), is_strong) in shadows.iter().zip(shares).zip(is_strong) {
+        for (i, bits) in shadow.bits.iter().enumerate().filter(|(_, bits)| **bits != 0) {
+            let by = if bits & OTHERS != 0 { 0 } else { 2 - usize::from(*is_strong) };
+            blocked[by][i] += *share as f32;
+        }
+    }
+    let [others, strong, weak] = blocked;
+    (0..n).map(|i| [others[i], strong[i], weak[i]].map(f64::from)).collect()
+}
+
+/// One channel of a surface in known light.
+struct LitChannel<'a> {
+    sheet: &'a SurfaceTexture<'a>,
+    /// Texels beside the thing, and their linear light.
+    rows: &'a [usize],
+    values: Vec<f32>,
+    /// Blocked shares of the light at each texel by [`blocked_light`].
+    blocked: Vec<[f64; 3]>,
+}
+
+impl LitChannel<'_> {
+    /// Returns the gain of each texel without the thing, and its brightest light then.
+    fn without_thing(&self) -> (Vec<f32>, Vec<f32>) {
+        let mut strength = [1.0; 2];
+        let (mut level, mut counts, mut usual) = (Vec::new(), vec![1.0; self.rows.len()], 0.0);
+        for _ in 0..STRENGTH_ROUNDS {
+            let column = |k: usize| {
+                self.rows.iter().map(|&i| (base(self.sheet, i)[k] * self.left(i, strength)) as f32).collect()
+            };
+            let columns: Vec<Vec<f32>> = (0..light::FREE).map(column).collect();
+            let weights = light::solve(&columns, &self.values, &counts);
+            let unshaded = |i| unshaded(self.sheet, i, &weights).max(f64::from(DARK));
+            level = (0..self.blocked.len()).map(unshaded).collect();
+            strength = self.strength(&level, &counts, usual);
+            let off = |(&i, v): (&usize, &f32)| f64::from(*v) - level[i] * self.left(i, strength);
+            (counts, usual) = light::row_weights(&self.rows.iter().zip(&self.values).map(off).collect::<Vec<_>>());
+        }
+        let gain = |i: usize| (self.left(i, [0.0; 2]) / self.left(i, strength)) as f32;
+        let gain: Vec<f32> = (0..level.len()).map(|i| gain(i).clamp(GAINS.0, GAINS.1)).collect();
+        let without: Vec<f64> = (0..level.len()).map(|i| level[i] * self.left(i, [0.0; 2])).collect();
+        let of_fit = |(&i, v): (&usize, &f32)| f64::from(*v * gain[i]) / without[i];
+        let of_fit: Vec<f64> = self.rows.iter().zip(&self.values).map(of_fit).collect();
+        let brightest = quantile(&of_fit, BRIGHTEST.0).clamp(1.0, BRIGHTEST.1);
+        (blurred(gain, self.sheet.size), without.iter().map(|v| (v * brightest) as f32).collect())
+    }
+
+    /// Returns the share of light at a texel if the thing's shadow is this strong.
+    fn left(&self, i: usize, strength: [f64; 2]) -> f64 {
+        let [others, strong, weak] = self.blocked[i];
+        (1.0 - others - strength[0] * strong - strength[1] * weak).max(LEAST_LIGHT)
+    }
+
+    /// Fits the strengths to the rows, whose deviations are `usual`; the fewer rows tell of them, the nearer to 1.
+    fn strength(&self, level: &[f64], counts: &[f64], usual: f64) -> [f64; 2] {
+        let prior = TOGETHER * (usual / DEVIATION).powi(2).max(1e-9);
+        let (mut gram, mut right) = (DMat2::from_diagonal(DVec2::splat(prior)), DVec2::splat(prior));
+        for ((&i, value), count) in self.rows.iter().zip(&self.values).zip(counts) {
+            let shade = DVec2::new(self.blocked[i][1], self.blocked[i][2]) * level[i];
+            let darker = level[i] * self.left(i, [0.0; 2]) - f64::from(*value);
+            right += shade * (count * darker);
+            gram += DMat2::from_cols(shade * shade.x, shade * shade.y) * *count;
+        }
+        let found = (gram.inverse() * right).to_array();
+        std::array::from_fn(|k| found[k].clamp(STRENGTHS[k].0, STRENGTHS[k].1))
     }
 }
 
@@ -201,6 +305,16 @@ fn base(sheet: &SurfaceTexture<'_>, i: usize) -> [f64; light::FREE] {
     let part = |at: usize, length: usize| at as f64 / length.max(1) as f64 - 0.5;
     let (x, y) = (part(i % sheet.size[0], sheet.size[0]), part(i / sheet.size[0], sheet.size[1]));
     [1.0, x, y, x * x, x * y, y * y]
+}
+
+/// Brightness of a texel without shadows, by the leading weights.
+fn unshaded(sheet: &SurfaceTexture<'_>, i: usize, weights: &[f64]) -> f64 {
+    base(sheet, i).iter().zip(weights).map(|(b, w)| b * w).sum()
+}
+
+/// Returns a number from 0 to 1 for a texel, without a pattern.
+fn scattered(i: usize) -> f64 {
+    f64::from((i as u32).wrapping_mul(2_654_435_761)) / f64::from(u32::MAX)
 }
 
 /// Occluders of the light from one direction, for each texel.

@@ -8,13 +8,13 @@ use super::paint::{self, Paint};
 use super::plane::Plane;
 use super::views::{SeenView, TOUCHED};
 use crate::math::grid;
-use crate::math::srgb::brighter;
+use crate::math::srgb::{self, brighter};
 use crate::math::stats::median;
 use crate::models::ModelError;
 use crate::models::lama::Lama;
 
-/// Texels along a side: of the coarse sheet, and of a fine sheet at most.
-const FIRST: usize = 96;
+/// Texels of the coarse sheet along a radius of the thing, and of a fine sheet along a side at most.
+const COARSE: f64 = 16.0;
 const MOST: usize = 400;
 /// Visible margin around a hole to paint from, as a share of its larger side.
 const MARGIN: f64 = 0.75;
@@ -34,7 +34,7 @@ const DIFFERENT: (f32, f32) = (0.03, 4.0);
 
 /// Gain from which seen texels are drawn anew: Gaussians there mix surface, shadow and thing.
 const DRAWN_ANEW: f32 = 1.5;
-/// Least texels of empty space with an edge of the surface, and texels beside it that are not drawn anew.
+/// Least texels of an area with an edge, such as empty space, and texels beside it whose colors are mixed.
 const OPEN: usize = 30;
 const EDGE: usize = 3;
 
@@ -86,7 +86,8 @@ impl<'a> SurfaceTexture<'a> {
         let middle = ball.center - plane.origin;
         let side = 2.0 * reach * ball.radius;
         let corner = [plane.u, plane.v].map(|along| middle.dot(along) - 0.5 * side);
-        Self::looked_at(plane, corner, side / FIRST as f64, [FIRST; 2], seen)
+        let step = ball.radius / COARSE;
+        Self::looked_at(plane, corner, step, [(side / step).ceil() as usize; 2], seen)
     }
 
     /// Returns the part of this sheet that the thing in `ball` hid from all views, in fine texels, with its visible
@@ -161,6 +162,13 @@ impl<'a> SurfaceTexture<'a> {
         grown.iter().zip(&self.state).map(|(is, s)| *is && (s.is_surface() || *s == Texel::Hidden)).collect()
     }
 
+    /// Returns the texels in areas where `is` holds, without specks, and those beside them.
+    fn beside(&self, is: impl Fn(usize) -> bool) -> Vec<bool> {
+        let (label, areas) = grid::regions(self.size[0], self.state.len(), is);
+        let inside = label.iter().map(|of| *of > 0 && areas[*of as usize - 1] >= OPEN).collect();
+        grid::grown(self.size[0], inside, EDGE)
+    }
+
     fn find_deep(&mut self) {
         let open = self.state.iter().map(|s| !s.is_drawn()).collect();
         self.deep = grid::grown(self.size[0], open, RIM).iter().map(|open| !open).collect();
@@ -196,6 +204,11 @@ impl<'a> SurfaceTexture<'a> {
         self.find_deep();
     }
 
+    /// Returns the linear light of these texels in channel `c`.
+    pub(super) fn linear(&self, texels: &[usize], c: usize) -> Vec<f32> {
+        texels.iter().map(|&i| srgb::linear(self.color[i][c].max(0.0))).collect()
+    }
+
     /// Returns the center of texel `i` in the world.
     pub(super) fn center(&self, i: usize) -> DVec3 {
         let at = |axis: usize, t: usize| self.corner[axis] + (t as f64 + 0.5) * self.step;
@@ -224,15 +237,12 @@ impl<'a> SurfaceTexture<'a> {
     }
 
     /// Makes the seen texels brighter. Those of the surface itself, `own`, change their state in deep shadow.
-    pub(super) fn brighten(&mut self, own: impl Fn(usize) -> bool, gain: impl Fn(DVec3, [f32; 3]) -> [f32; 3]) {
-        let (width, n) = (self.size[0], self.state.len());
-        let (label, areas) = grid::regions(width, n, |i| self.state[i] == Texel::Free);
-        let open = label.iter().map(|of| *of > 0 && areas[*of as usize - 1] >= OPEN).collect();
-        let edge = grid::grown(width, open, EDGE);
-        for i in (0..n).filter(|i| self.state[*i] == Texel::Seen).collect::<Vec<_>>() {
+    pub(super) fn brighten(&mut self, own: &[bool], gain: impl Fn(DVec3, [f32; 3]) -> [f32; 3]) {
+        let edge = self.beside(|i| self.state[i] == Texel::Free);
+        for i in (0..self.state.len()).filter(|i| self.state[*i] == Texel::Seen).collect::<Vec<_>>() {
             let gain = gain(self.center(i), self.color[i]);
             self.color[i] = brighter(self.color[i], gain);
-            if own(i) && !edge[i] && gain.iter().any(|g| *g >= DRAWN_ANEW) {
+            if own[i] && !edge[i] && gain.iter().any(|g| *g >= DRAWN_ANEW) {
                 self.state[i] = Texel::Shaded;
             }
         }
@@ -263,12 +273,24 @@ impl<'a> SurfaceTexture<'a> {
             .map(|(i, t)| (i, t.1))
     }
 
-    /// Paints the hidden texels, by the network if there is one.
-    pub(super) fn paint(&mut self, how: Paint, seed: u64, network: Option<&mut Lama>) -> Result<(), ModelError> {
+    /// Paints the hidden texels, by the network if there is one. `own` = texels of the surface itself.
+    pub(super) fn paint(
+        &mut self,
+        how: Paint,
+        own: &[bool],
+        seed: u64,
+        network: Option<&mut Lama>,
+    ) -> Result<(), ModelError> {
         let hole = grid::grown(self.size[0], self.hidden(), RIM);
         let known: Vec<bool> = (0..hole.len()).map(|i| self.state[i].is_surface() && !hole[i]).collect();
         let Some(network) = network else {
             paint::fill(&mut self.color, self.size, &known, &hole, how, seed);
+            if how == Paint::Patches {
+                let others = self.beside(|i| !self.state[i].is_surface() && !hole[i]);
+                let shade: Vec<bool> = (0..hole.len()).map(|i| self.state[i] == Texel::Shaded && !hole[i]).collect();
+                let plain: Vec<bool> = (0..hole.len()).map(|i| known[i] && own[i] && !others[i] && !shade[i]).collect();
+                paint::continue_lines(&mut self.color, self.size, &plain, &hole, &shade);
+            }
             return Ok(());
         };
         let painted = network.paint(&self.color, self.size, &known)?;

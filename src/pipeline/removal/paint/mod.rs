@@ -2,8 +2,9 @@
 //!
 //! Brightness and texture are painted separately. The smooth part fills the hole like a soap film, as a wall in
 //! slanting light needs. The rest, the texture, is composed of patches seen elsewhere (PatchMatch: Barnes et al.
-//! 2009; voting over scales: Wexler et al. 2007).
+//! 2009; voting over scales: Wexler et al. 2007). Where the surface has lines, these go on ([`lines`]).
 
+mod lines;
 mod telea;
 
 use rand::{RngExt, SeedableRng};
@@ -16,7 +17,7 @@ use crate::math::grid::{neighbors, spread};
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
 #[serde(rename_all = "lowercase")]
 pub(crate) enum Paint {
-    /// The brightness of its rim, with texture from around it.
+    /// The brightness of its rim, with texture from around it, and lines that go on.
     #[default]
     Patches,
     /// The brightness of its rim alone.
@@ -60,6 +61,24 @@ pub(super) fn fill(color: &mut [[f32; 3]], size: [usize; 2], known: &[bool], hol
     let picture = Picture { size, color: texture, known: known.to_vec(), hole: hole.to_vec() };
     let texture = picture.painted(&mut Pcg32::seed_from_u64(seed));
     holes.into_iter().for_each(|i| color[i] = std::array::from_fn(|c| smooth[i][c] + texture[i][c]));
+}
+
+/// Continues lines of the `plain` texels, with the light of the surface itself, through the `hole`. Texels in deep
+/// `shade` keep their brightness and get the texture of the lines.
+pub(super) fn continue_lines(color: &mut [[f32; 3]], size: [usize; 2], plain: &[bool], hole: &[bool], shade: &[bool]) {
+    let n = color.len();
+    let wanted: Vec<bool> = (0..n).map(|i| hole[i] || shade[i]).collect();
+    let Some(surface) = lines::LinedSurface::new(color, size, plain, &wanted) else { return };
+    let found = surface.continued();
+    let drawn: Vec<[f32; 3]> = (0..n).map(|i| found[i].map_or(color[i], |line| line.0)).collect();
+    let all: Vec<bool> = (0..n).map(|i| plain[i] || wanted[i]).collect();
+    let [smooth, own] = [&drawn, &*color].map(|of| blurred(of, size, &all));
+    for (i, (line, share)) in found.into_iter().enumerate().filter_map(|(i, line)| Some((i, line?))) {
+        for c in 0..3 {
+            let brighter = if hole[i] { 0.0 } else { own[i][c] - smooth[i][c] };
+            color[i][c] += share * (line[c] + brighter - color[i][c]);
+        }
+    }
 }
 
 /// Returns the color of the nearest known texel for each.
@@ -327,6 +346,40 @@ mod tests {
         let (patches, smooth) = (error(tiles, Paint::Patches), error(tiles, Paint::Smooth));
         assert!(patches < 0.05 && smooth > 0.1, "{patches} {smooth}");
         assert!(error(tiles, Paint::Telea) > 2.0 * patches, "{}", error(tiles, Paint::Telea));
+    }
+
+    /// Grain along a slanted line, without a period.
+    fn grain(x: usize, y: usize) -> [f32; 3] {
+        let across = y as f32 - 0.3 * x as f32 + 100.0;
+        let bright = |k: f32| (k.mul_add(12.9898, 4.1).sin() * 43_758.547).fract().abs();
+        let (row, part) = ((across / 3.0).floor(), (across / 3.0).fract());
+        [0.4 + 0.2 * (bright(row) * (1.0 - part) + bright(row + 1.0) * part); 3]
+    }
+
+    #[test]
+    fn lines_go_on_through_the_hole_and_not_into_what_stands_beside_it() {
+        let n = SIZE[0] * SIZE[1];
+        let truth: Vec<[f32; 3]> = (0..n).map(|i| grain(i % SIZE[0], i / SIZE[0])).collect();
+        let within =
+            |i: usize, x: std::ops::Range<usize>| x.contains(&(i % SIZE[0])) && (24..40).contains(&(i / SIZE[0]));
+        let hole: Vec<bool> = (0..n).map(|i| within(i, 32..48)).collect();
+        let known: Vec<bool> = hole.iter().map(|h| !h).collect();
+        let error = |color: &[[f32; 3]]| {
+            let inside = || (0..n).filter(|i| hole[*i]);
+            inside().map(|i| (color[i][0] - truth[i][0]).abs()).sum::<f32>() / inside().count() as f32
+        };
+        let run = |black: std::ops::Range<usize>| {
+            let mut color = truth.clone();
+            (0..n).filter(|i| within(*i, black.clone())).for_each(|i| color[i] = [0.0; 3]);
+            fill(&mut color, SIZE, &known, &hole, Paint::Smooth, 1);
+            let smooth = error(&color);
+            continue_lines(&mut color, SIZE, &known, &hole, &vec![false; n]);
+            (smooth, error(&color))
+        };
+        let (smooth, lines) = run(0..0);
+        assert!(lines < 0.3 * smooth, "{lines} {smooth}");
+        let (smooth, lines) = run(48..56);
+        assert!(lines < smooth, "{lines} {smooth}");
     }
 
     #[test]
