@@ -4,7 +4,7 @@
 //! because it is made of Gaussians. The light along each direction is fitted to the brightness of the surface
 //! ([`light`]), first from everywhere, then ever finer about the strongest directions. Everything around the thing
 //! stands in the same light, so grain and stains, which look like some of the shadows, do not look like all of them.
-//! How strong the thing's own shadow is, is fitted beside it ([`LitChannel`]): light that it reflects makes it weaker.
+//! The strength of the thing's own shadow is fitted beside it ([`LitChannel`]): light that it reflects makes it weaker.
 
 use glam::{DMat2, DVec2, DVec3};
 use rayon::prelude::*;
@@ -34,7 +34,7 @@ const LEAST_SHADE: f64 = 0.02;
 const LEAST_INSIDE: f64 = 40.0;
 /// Largest share of the squared differences that credible shadows leave unexplained: in the thing's shadow, beyond the
 /// usual ones beside it; or of all things, everywhere.
-const EXPLAINED: (f64, f64) = (0.7, 0.75);
+const EXPLAINED: (f64, f64) = (0.7, 0.85);
 /// Share of the light from which a direction is strong: its shadows have edges.
 const STRONG: f64 = 0.04;
 /// Least share of light that is left in a shadow.
