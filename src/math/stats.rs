@@ -4,6 +4,9 @@
 
 use super::Real;
 
+/// Standard deviation of normally distributed values, as a multiple of the median of their sizes.
+pub(crate) const OF_MAD: f64 = 1.4826;
+
 /// The `q`-quantile (0 to 1) of `values` by linear interpolation; NaN for an empty sample.
 pub(crate) fn quantile(values: &[f64], q: f64) -> f64 {
     if values.is_empty() {

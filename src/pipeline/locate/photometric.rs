@@ -2,6 +2,7 @@
 //! what is not in the scene (Geman and McClure 1985).
 
 use crate::math::resize::{Filter, resize};
+use crate::math::stats::OF_MAD;
 use crate::pipeline::metrics;
 use crate::scene::PhotoPixels;
 
@@ -15,8 +16,6 @@ pub(super) const WIDTH: f32 = 2.5;
 const WIDTHS: [f32; 2] = [0.02, 0.3];
 /// Rounds of gain, bias and weights.
 const ROUNDS: usize = 4;
-/// Standard deviations in a median absolute deviation.
-const OF_MAD: f32 = 1.4826;
 
 /// A photo at one size.
 #[derive(Clone, Debug)]
@@ -134,7 +133,7 @@ fn of_channel(rendered: &[f32], photo: &[f32], coverage: &[f32]) -> (f32, f32, f
         }
         let middle = errors.len() / 2;
         let mad = *errors.select_nth_unstable_by(middle, f32::total_cmp).1;
-        width = (WIDTH * OF_MAD * mad).clamp(WIDTHS[0], WIDTHS[1]);
+        width = (WIDTH * OF_MAD as f32 * mad).clamp(WIDTHS[0], WIDTHS[1]);
         for (i, w) in weights.iter_mut().enumerate() {
             *w = base[i] / (1.0 + (off(i) / width).powi(2)).powi(2);
         }

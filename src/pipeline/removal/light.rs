@@ -1,9 +1,7 @@
 //! Light from each direction by the shadows on a surface: weighted least squares with non-negative weights.
 
-use crate::math::stats::median;
+use crate::math::stats::{OF_MAD, median};
 
-/// Standard deviation of normally distributed values, as a multiple of their median size.
-const TO_DEVIATION: f64 = 1.4826;
 /// Sweeps over all unknowns.
 const SWEEPS: usize = 200;
 /// Rounds of reweighting, in which outliers count less.
@@ -23,16 +21,6 @@ pub(super) fn fit(columns: &[Vec<f32>], values: &[f32]) -> (Vec<f64>, Vec<f64>) 
         weights = solve(columns, values, &rows);
     }
     (weights, rows)
-}
-
-/// Returns the weight of each row by its residual, small for outliers, and the usual deviation.
-pub(super) fn row_weights(off: &[f64]) -> (Vec<f64>, f64) {
-    let sizes: Vec<f64> = off.iter().map(|r| r.abs()).collect();
-    let usual = if sizes.is_empty() { 0.0 } else { median(&sizes) };
-    // Tukey's weight at six times the median.
-    let limit = (6.0 * usual).max(1e-6);
-    let weight = |r: &f64| (1.0 - (r / limit).powi(2)).max(0.0).powi(2);
-    (off.iter().map(weight).collect(), TO_DEVIATION * usual)
 }
 
 /// The same with given weights of the rows.
@@ -62,6 +50,16 @@ pub(super) fn solve(columns: &[Vec<f32>], values: &[f32], rows: &[f64]) -> Vec<f
         }
     }
     weights
+}
+
+/// Returns the weight of each row by its residual, small for outliers, and the usual deviation.
+pub(super) fn row_weights(off: &[f64]) -> (Vec<f64>, f64) {
+    let sizes: Vec<f64> = off.iter().map(|r| r.abs()).collect();
+    let usual = if sizes.is_empty() { 0.0 } else { median(&sizes) };
+    // Tukey's weight at six times the median.
+    let limit = (6.0 * usual).max(1e-6);
+    let weight = |r: &f64| (1.0 - (r / limit).powi(2)).max(0.0).powi(2);
+    (off.iter().map(weight).collect(), OF_MAD * usual)
 }
 
 /// Returns the values minus the weighted columns.

@@ -8,8 +8,8 @@
 //! texture is painted on the surface, not in a view, so all views agree.
 //!
 //! The object's shadow on a flat surface is lifted, as far as its blocking of the light explains it ([`shade`]). Where
-//! the shadow is deep, the surface is drawn anew from the photos' lifted colors. The object's other shadows,
-//! reflections, and light that it reflects stay.
+//! the shadow is deep, the surface is drawn anew from the photos' lifted colors. The object's other shadows and
+//! its reflections stay.
 //!
 //! New Gaussians of hidden surfaces are marked as invented in the cloud. The scene from which a thing is removed is
 //! never written to.

@@ -19,8 +19,32 @@ const CLEAR: (f32, f32) = (0.3, 0.6);
 /// Difference of a line's ends at which it counts half, in standard deviations of the surface's colors.
 const APART: f32 = 2.0;
 
+/// Continues lines of the `plain` texels, with the light of the surface itself, through the `hole`. Texels in deep
+/// `shade` keep their brightness and get the texture of the lines.
+pub(in crate::pipeline::removal) fn continue_lines(
+    color: &mut [[f32; 3]],
+    size: [usize; 2],
+    plain: &[bool],
+    hole: &[bool],
+    shade: &[bool],
+) {
+    let n = color.len();
+    let wanted: Vec<bool> = (0..n).map(|i| hole[i] || shade[i]).collect();
+    let Some(surface) = LinedSurface::new(color, size, plain, &wanted) else { return };
+    let found = surface.continued();
+    let drawn: Vec<[f32; 3]> = (0..n).map(|i| found[i].map_or(color[i], |line| line.0)).collect();
+    let all: Vec<bool> = (0..n).map(|i| plain[i] || wanted[i]).collect();
+    let [smooth, own] = [&drawn, &*color].map(|of| blurred(of, size, &all));
+    for (i, (line, share)) in found.into_iter().enumerate().filter_map(|(i, line)| Some((i, line?))) {
+        for c in 0..3 {
+            let brighter = if hole[i] { 0.0 } else { own[i][c] - smooth[i][c] };
+            color[i][c] += share * (line[c] + brighter - color[i][c]);
+        }
+    }
+}
+
 /// Picture of a surface with a hole.
-pub(super) struct LinedSurface<'a> {
+struct LinedSurface<'a> {
     color: &'a [[f32; 3]],
     size: [usize; 2],
     /// Texels from which lines come, and to which they go on.
@@ -35,7 +59,7 @@ pub(super) struct LinedSurface<'a> {
 
 impl<'a> LinedSurface<'a> {
     /// Measures the lines; `None` if no known texels lie together.
-    pub(super) fn new(color: &'a [[f32; 3]], size: [usize; 2], known: &'a [bool], wanted: &'a [bool]) -> Option<Self> {
+    fn new(color: &'a [[f32; 3]], size: [usize; 2], known: &'a [bool], wanted: &'a [bool]) -> Option<Self> {
         let tensor = tensor(color, size, known)?;
         let all: Vec<[f32; 3]> = color.iter().zip(known).filter(|(_, k)| **k).map(|(c, _)| *c).collect();
         let usual = [0, 1, 2].map(|c| median(&all.iter().map(|v| f64::from(v[c])).collect::<Vec<_>>()) as f32);
@@ -44,7 +68,7 @@ impl<'a> LinedSurface<'a> {
     }
 
     /// Returns for each wanted texel the color by the line through it, and how much it counts, 0 to 1.
-    pub(super) fn continued(&self) -> Vec<Option<([f32; 3], f32)>> {
+    fn continued(&self) -> Vec<Option<([f32; 3], f32)>> {
         (0..self.color.len()).into_par_iter().map(|i| if self.wanted[i] { self.through(i) } else { None }).collect()
     }
 

@@ -7,6 +7,7 @@
 mod lines;
 mod telea;
 
+pub(super) use lines::continue_lines;
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg32;
 use serde::{Deserialize, Serialize};
@@ -61,24 +62,6 @@ pub(super) fn fill(color: &mut [[f32; 3]], size: [usize; 2], known: &[bool], hol
     let picture = Picture { size, color: texture, known: known.to_vec(), hole: hole.to_vec() };
     let texture = picture.painted(&mut Pcg32::seed_from_u64(seed));
     holes.into_iter().for_each(|i| color[i] = std::array::from_fn(|c| smooth[i][c] + texture[i][c]));
-}
-
-/// Continues lines of the `plain` texels, with the light of the surface itself, through the `hole`. Texels in deep
-/// `shade` keep their brightness and get the texture of the lines.
-pub(super) fn continue_lines(color: &mut [[f32; 3]], size: [usize; 2], plain: &[bool], hole: &[bool], shade: &[bool]) {
-    let n = color.len();
-    let wanted: Vec<bool> = (0..n).map(|i| hole[i] || shade[i]).collect();
-    let Some(surface) = lines::LinedSurface::new(color, size, plain, &wanted) else { return };
-    let found = surface.continued();
-    let drawn: Vec<[f32; 3]> = (0..n).map(|i| found[i].map_or(color[i], |line| line.0)).collect();
-    let all: Vec<bool> = (0..n).map(|i| plain[i] || wanted[i]).collect();
-    let [smooth, own] = [&drawn, &*color].map(|of| blurred(of, size, &all));
-    for (i, (line, share)) in found.into_iter().enumerate().filter_map(|(i, line)| Some((i, line?))) {
-        for c in 0..3 {
-            let brighter = if hole[i] { 0.0 } else { own[i][c] - smooth[i][c] };
-            color[i][c] += share * (line[c] + brighter - color[i][c]);
-        }
-    }
 }
 
 /// Returns the color of the nearest known texel for each.
