@@ -5,9 +5,10 @@ use std::collections::HashMap;
 use glam::{DMat3, DQuat, DVec3};
 
 use super::extent::{Ball, ThingExtent};
+use super::occlusion::Occluder;
 use super::plane::{self, Plane};
 use super::rebuild::{NewGaussian, SPREAD, shown};
-use super::shade::{Brightening, Occluder};
+use super::shade::Brightening;
 use super::sheet::{SurfaceTexture, Texel};
 use super::views::{self, SeenView};
 use super::{ClosedSurface, Paint, RemovalError, RemovalOptions, RemovalReport};

@@ -17,6 +17,7 @@
 mod close;
 mod extent;
 mod light;
+mod occlusion;
 mod paint;
 mod plane;
 mod rebuild;

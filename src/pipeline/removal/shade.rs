@@ -1,24 +1,21 @@
 //! Shadow of a thing on a flat surface, and the brightness of the surface without it.
 //!
 //! A matt surface of one color shows its light minus the occluded light. The occlusion along a direction is known,
-//! because it is made of Gaussians. The light along each direction is fitted to the brightness of the surface
-//! ([`light`]), first from everywhere, then ever finer about the strongest directions. Everything around the thing
-//! stands in the same light, so grain and stains, which look like some of the shadows, do not look like all of them.
-//! The strength of the thing's own shadow is fitted beside it ([`LitChannel`]): light that it reflects makes it weaker.
+//! because it is made of Gaussians. An even sky and lights along single directions are fitted to the brightness of the
+//! surface ([`light`]), first from everywhere, then ever finer about the strongest directions. Everything around the
+//! thing stands in the same light, so grain and stains, which look like some of the shadows, do not look like all of
+//! them; a light whose shadows could be grain does not count. The strength of the thing's own shadow is fitted beside
+//! it ([`LitChannel`]): light that it reflects makes it weaker.
 
 use glam::{DMat2, DVec2, DVec3};
-use rayon::prelude::*;
 
 use super::light;
+use super::occlusion::{LEAST_COSINE, OTHERS, Occluder, Shadow, THING, around, blocked_sky, hemisphere};
 use super::plane::Plane;
 use super::sheet::{SurfaceTexture, Texel};
 use crate::math::srgb;
 use crate::math::stats::quantile;
 
-/// Directions of the first round, over the hemisphere above the surface.
-const DIRECTIONS: usize = 64;
-/// Least cosine to the normal: shadows of grazing light are long and faint.
-const LEAST_COSINE: f64 = 0.2;
 /// Rounds in which directions with much light are divided, and the share of the light that is much.
 const FINER_ROUNDS: usize = 3;
 const MUCH: f64 = 0.06;
@@ -35,14 +32,14 @@ const LEAST_INSIDE: f64 = 40.0;
 /// Largest share of the squared differences that credible shadows leave unexplained: in the thing's shadow, beyond the
 /// usual ones beside it; or of all things, everywhere.
 const EXPLAINED: (f64, f64) = (0.7, 0.85);
-/// Share of the light from which a direction is strong: its shadows have edges.
-const STRONG: f64 = 0.04;
 /// Least share of light that is left in a shadow.
 const LEAST_LIGHT: f64 = 0.05;
 /// Expected deviation of a shadow's strength from 1, and neighboring texels that differ together, as grain does.
 const DEVIATION: f64 = 0.3;
 const TOGETHER: f64 = 20.0;
-/// Strengths of a shadow from strong and from weak directions. A bright thing may reflect more light than it blocks.
+/// Deviations of a sum of such texels by which the shadows of a light must differ from grain.
+const SURE: f64 = 2.0;
+/// Strengths of a shadow from single lights and from the sky. A bright thing may reflect more light than it blocks.
 const STRENGTHS: [(f64, f64); 2] = [(0.0, 2.0), (-0.5, 2.0)];
 /// Rounds of fitting the brightness of the surface and the strengths in turn.
 const STRENGTH_ROUNDS: usize = 4;
@@ -55,18 +52,6 @@ const LEAST_SHADED: usize = 12;
 const BRIGHTEST: (f64, f64) = (0.95, 2.0);
 /// Linear light that counts as black.
 const DARK: f32 = 1e-4;
-
-/// Opaque Gaussian over the surface.
-pub(super) struct Occluder {
-    pub(super) at: DVec3,
-    pub(super) radius: f64,
-    /// True if it belongs to the thing.
-    pub(super) is_thing: bool,
-}
-
-/// Bits of the occluders.
-const OTHERS: u8 = 1;
-const THING: u8 = 2;
 
 /// Gain of each texel of a sheet without the thing, in linear light.
 pub(super) struct Brightening<'a> {
@@ -92,21 +77,19 @@ impl<'a> Brightening<'a> {
         }
         let part = MOST_TEXELS as f64 / all.len() as f64;
         let rows = all.into_iter().filter(|i| scattered(*i) < part).collect();
-        let lit = LitSurface { plane, sheet, occluders, rows };
+        let everywhere = Shadow::all(plane, sheet, &hemisphere(plane), occluders);
+        let sky = blocked_sky(plane, &everywhere, sheet.state.len());
+        let lit = LitSurface { plane, sheet, occluders, rows, sky };
         let channels = [0, 1, 2].map(|c| sheet.linear(&lit.rows, c));
         let values: Vec<f32> = (0..lit.rows.len()).map(|k| channels.iter().map(|c| c[k]).sum::<f32>() / 3.0).collect();
-        let (about, counts) = lit.directions(&values);
+        let (about, counts) = lit.directions(everywhere, &values);
         let columns = lit.columns(&about, THING | OTHERS);
-        let mean = light::solve(&columns, &values, &counts);
+        let mean = light::solve(&columns, &values, &counts, 0.0);
         if !lit.is_explained(&about, &values, (&columns, &mean), &counts) {
             return None;
         }
-        let total: f64 = mean[light::FREE..].iter().sum();
-        let is_strong: Vec<bool> = mean[light::FREE..].iter().map(|w| *w > STRONG * total).collect();
         let found = [0, 1, 2].map(|c| {
-            let weights = light::solve(&columns, &channels[c], &counts);
-            let shares = lit.shares(&weights);
-            let blocked = blocked_light(&about, &shares, &is_strong, sheet.state.len());
+            let blocked = lit.blocked(&about, &light::solve(&columns, &channels[c], &counts, 0.0));
             LitChannel { sheet, rows: &beside, values: sheet.linear(&beside, c), blocked }.without_thing()
         });
         let gain = |i: usize| [0, 1, 2].map(|c| found[c].0[i]);
@@ -134,18 +117,20 @@ struct LitSurface<'a> {
     occluders: &'a [Occluder],
     /// Texels that the light is fitted to.
     rows: Vec<usize>,
+    /// Shares of the sky that others and the thing alone block at each texel.
+    sky: Vec<[f32; 2]>,
 }
 
 impl LitSurface<'_> {
-    /// Returns the directions of the light, and the weight of each row.
-    fn directions(&self, values: &[f32]) -> (Vec<Shadow>, Vec<f64>) {
-        let mut about = self.shadows(&hemisphere(self.plane));
-        let mut spacing = (std::f64::consts::TAU * (1.0 - LEAST_COSINE) / DIRECTIONS as f64).sqrt();
+    /// Returns the directions of single lights, searched from these on, and the weight of each row.
+    fn directions(&self, mut about: Vec<Shadow>, values: &[f32]) -> (Vec<Shadow>, Vec<f64>) {
+        let mut spacing = (std::f64::consts::TAU * (1.0 - LEAST_COSINE) / about.len() as f64).sqrt();
         let mut counts = Vec::new();
         for round in 0..=FINER_ROUNDS {
-            let (weights, rows) = light::fit(&self.columns(&about, THING | OTHERS), values);
+            let grain = SURE * TOGETHER.sqrt();
+            let (weights, rows) = light::fit(&self.columns(&about, THING | OTHERS), values, grain);
             counts = rows;
-            let weights = &weights[light::FREE..];
+            let weights = &weights[light::SKY + 1..];
             let total: f64 = weights.iter().sum();
             let mut kept: Vec<(Shadow, f64)> =
                 about.into_iter().zip(weights.iter().copied()).filter(|(_, w)| *w > 1e-3 * total).collect();
@@ -156,15 +141,10 @@ impl LitSurface<'_> {
                 much.flat_map(|d| around(d, spacing)).filter(|d| d.dot(self.plane.normal) >= LEAST_COSINE).collect();
             about = kept.into_iter().map(|k| k.0).collect();
             if round < FINER_ROUNDS {
-                about.extend(self.shadows(&finer));
+                about.extend(Shadow::all(self.plane, self.sheet, &finer, self.occluders));
             }
         }
         (about, counts)
-    }
-
-    fn shadows(&self, directions: &[DVec3]) -> Vec<Shadow> {
-        let one = |d: &DVec3| Shadow { toward: *d, bits: blocked(self.plane, self.sheet, *d, self.occluders) };
-        directions.par_iter().map(one).collect()
     }
 
     /// Returns the columns that compose the brightness of the rows, with the occluders `which`.
@@ -172,7 +152,9 @@ impl LitSurface<'_> {
         let rows = &self.rows;
         let base = (0..light::FREE).map(|k| rows.iter().map(|&i| base(self.sheet, i)[k] as f32).collect());
         let shade = |s: &Shadow| rows.iter().map(|&i| if s.bits[i] & which == 0 { 0.0 } else { -1.0 }).collect();
-        base.chain(shadows.iter().map(shade)).collect()
+        let of = |[others, thing]: [f32; 2]| if which & THING == 0 { others } else { others + thing };
+        let sky = rows.iter().map(|&i| -of(self.sky[i])).collect();
+        base.chain(std::iter::once(sky)).chain(shadows.iter().map(shade)).collect()
     }
 
     /// Returns whether the thing's shadow explains the darker texels in it, or all shadows those of the surface.
@@ -188,7 +170,8 @@ impl LitSurface<'_> {
             .iter()
             .map(|&i| {
                 let shade = |s: (&Shadow, &f64)| if s.0.bits[i] == THING { *s.1 } else { 0.0 };
-                let dark: f64 = about.iter().zip(&weights[light::FREE..]).map(shade).sum();
+                let sky = f64::from(self.sky[i][1]) * weights[light::SKY];
+                let dark = sky + about.iter().zip(&weights[light::SKY + 1..]).map(shade).sum::<f64>();
                 dark > SHADED * unshaded(self.sheet, i, weights).abs()
             })
             .collect();
@@ -205,15 +188,16 @@ impl LitSurface<'_> {
             (sum - n * beside / of.max(1.0)).max(0.0)
         };
         let others = self.columns(about, OTHERS);
-        let bare = left(&light::residuals(&others, values, &light::solve(&others, values, counts)));
+        let bare = light::residuals(&others, values, &light::solve(&others, values, counts, 0.0));
+        let better = squares(&bare, true).0 - squares(&with, true).0;
         let least = squares(&vec![LEAST_SHADE * self.level(weights); values.len()], true);
-        if least.1 < LEAST_INSIDE || bare < least.0 {
+        if least.1 < LEAST_INSIDE || better < least.0 {
             return false;
         }
         let sum = |off: &[f64]| -> f64 { off.iter().zip(counts).map(|(off, n)| n * off * off).sum() };
         let even = &all[..light::FREE];
-        let without = sum(&light::residuals(even, values, &light::solve(even, values, counts)));
-        left(&with) < EXPLAINED.0 * bare || sum(&with) < EXPLAINED.1 * without
+        let without = sum(&light::residuals(even, values, &light::solve(even, values, counts, 0.0)));
+        left(&with) < EXPLAINED.0 * left(&bare) || sum(&with) < EXPLAINED.1 * without
     }
 
     /// Returns the mean brightness without shadows.
@@ -222,25 +206,20 @@ impl LitSurface<'_> {
         (sum / self.rows.len() as f64).max(f64::from(DARK))
     }
 
-    /// Returns the light of each direction as a share of the mean brightness without shadows.
-    fn shares(&self, weights: &[f64]) -> Vec<f64> {
+    /// Returns the shares of light that are blocked at each texel: by others; by the thing alone, from single lights
+    /// and from the sky.
+    fn blocked(&self, about: &[Shadow], weights: &[f64]) -> Vec<[f64; 3]> {
         let level = self.level(weights);
-        weights[light::FREE..].iter().map(|w| w / level).collect()
-    }
-}
-
-/// Returns the shares of light that are blocked at each texel: by others; by the thing alone, from strong and from
-/// weak directions.
-fn blocked_light(shadows: &[Shadow], shares: &[f64], is_strong: &[bool], n: usize) -> Vec<[f64; 3]> {
-    let mut blocked = [(); 3].map(|()| vec![0.0_f32; n]);
-    for ((shadow, share), is_strong) in shadows.iter().zip(shares).zip(is_strong) {
-        for (i, bits) in shadow.bits.iter().enumerate().filter(|(_, bits)| **bits != 0) {
-            let by = if bits & OTHERS != 0 { 0 } else { 2 - usize::from(*is_strong) };
-            blocked[by][i] += *share as f32;
+        let share = |weight: f64| (weight / level) as f32;
+        let of_sky = |[others, thing]: &[f32; 2]| [*others, 0.0, *thing].map(|s| s * share(weights[light::SKY]));
+        let mut blocked: Vec<[f32; 3]> = self.sky.iter().map(of_sky).collect();
+        for (shadow, weight) in about.iter().zip(&weights[light::SKY + 1..]) {
+            for (blocked, bits) in blocked.iter_mut().zip(&shadow.bits).filter(|(_, bits)| **bits != 0) {
+                blocked[usize::from(bits & OTHERS == 0)] += share(*weight);
+            }
         }
+        blocked.into_iter().map(|of| of.map(f64::from)).collect()
     }
-    let [others, strong, weak] = blocked;
-    (0..n).map(|i| [others[i], strong[i], weak[i]].map(f64::from)).collect()
 }
 
 /// One channel of a surface in known light.
@@ -249,7 +228,7 @@ struct LitChannel<'a> {
     /// Texels beside the thing, and their linear light.
     rows: &'a [usize],
     values: Vec<f32>,
-    /// Blocked shares of the light at each texel by [`blocked_light`].
+    /// Blocked shares of the light at each texel by [`LitSurface::blocked`].
     blocked: Vec<[f64; 3]>,
 }
 
@@ -263,12 +242,13 @@ impl LitChannel<'_> {
                 self.rows.iter().map(|&i| (base(self.sheet, i)[k] * self.left(i, strength)) as f32).collect()
             };
             let columns: Vec<Vec<f32>> = (0..light::FREE).map(column).collect();
-            let weights = light::solve(&columns, &self.values, &counts);
+            let weights = light::solve(&columns, &self.values, &counts, 0.0);
             let unshaded = |i| unshaded(self.sheet, i, &weights).max(f64::from(DARK));
             level = (0..self.blocked.len()).map(unshaded).collect();
             strength = self.strength(&level, &counts, usual);
             let off = |(&i, v): (&usize, &f32)| f64::from(*v) - level[i] * self.left(i, strength);
-            (counts, usual) = light::row_weights(&self.rows.iter().zip(&self.values).map(off).collect::<Vec<_>>());
+            (counts, usual) =
+                light::row_weights(&self.rows.iter().zip(&self.values).map(off).collect::<Vec<_>>(), &self.values);
         }
         let gain = |i: usize| (self.left(i, [0.0; 2]) / self.left(i, strength)) as f32;
         let gain: Vec<f32> = (0..level.len()).map(|i| gain(i).clamp(GAINS.0, GAINS.1)).collect();
@@ -281,8 +261,8 @@ impl LitChannel<'_> {
 
     /// Returns the share of light at a texel if the thing's shadow is this strong.
     fn left(&self, i: usize, strength: [f64; 2]) -> f64 {
-        let [others, strong, weak] = self.blocked[i];
-        (1.0 - others - strength[0] * strong - strength[1] * weak).max(LEAST_LIGHT)
+        let [others, lights, sky] = self.blocked[i];
+        (1.0 - others - strength[0] * lights - strength[1] * sky).max(LEAST_LIGHT)
     }
 
     /// Fits the strengths to the rows, whose deviations are `usual`; the fewer rows tell of them, the nearer to 1.
@@ -315,65 +295,6 @@ fn unshaded(sheet: &SurfaceTexture<'_>, i: usize, weights: &[f64]) -> f64 {
 /// Returns a number from 0 to 1 for a texel, without a pattern.
 fn scattered(i: usize) -> f64 {
     f64::from((i as u32).wrapping_mul(2_654_435_761)) / f64::from(u32::MAX)
-}
-
-/// Occluders of the light from one direction, for each texel.
-struct Shadow {
-    toward: DVec3,
-    bits: Vec<u8>,
-}
-
-fn blocked(plane: &Plane, sheet: &SurfaceTexture<'_>, toward: DVec3, occluders: &[Occluder]) -> Vec<u8> {
-    let mut bits = vec![0; sheet.state.len()];
-    let [width, height] = sheet.size.map(|s| s as f64);
-    for o in occluders {
-        let foot = o.at - toward * (plane.height(o.at) / toward.dot(plane.normal));
-        let [x, y] = sheet.place(foot);
-        let reach = o.radius / sheet.step;
-        if !(x > -reach && y > -reach && x < width + reach && y < height + reach) {
-            continue;
-        }
-        let bit = if o.is_thing { THING } else { OTHERS };
-        let ends = |at: f64, most: f64| {
-            let first = (at - reach - 0.5).ceil().clamp(0.0, most) as usize;
-            (first, (at + reach - 0.5).floor().clamp(-1.0, most - 1.0) as i64)
-        };
-        let ((x0, x1), (y0, y1)) = (ends(x, width), ends(y, height));
-        for ty in y0 as i64..=y1 {
-            for tx in x0 as i64..=x1 {
-                let (dx, dy) = (tx as f64 + 0.5 - x, ty as f64 + 0.5 - y);
-                if dx * dx + dy * dy <= reach * reach {
-                    bits[ty as usize * sheet.size[0] + tx as usize] |= bit;
-                }
-            }
-        }
-        // An occluder smaller than a texel still lies in one.
-        if (0.0..width).contains(&x) && (0.0..height).contains(&y) {
-            bits[y as usize * sheet.size[0] + x as usize] |= bit;
-        }
-    }
-    bits
-}
-
-/// Returns directions spread evenly over the hemisphere above the surface.
-fn hemisphere(plane: &Plane) -> Vec<DVec3> {
-    let golden = std::f64::consts::PI * (3.0 - 5.0_f64.sqrt());
-    let one = |k: usize| {
-        let z = 1.0 - (1.0 - LEAST_COSINE) * (k as f64 + 0.5) / DIRECTIONS as f64;
-        let (sin, cos) = (golden * k as f64).sin_cos();
-        let r = (1.0 - z * z).sqrt();
-        plane.u * (r * cos) + plane.v * (r * sin) + plane.normal * z
-    };
-    (0..DIRECTIONS).map(one).collect()
-}
-
-/// Returns six directions at an angle about one.
-fn around(toward: DVec3, angle: f64) -> impl Iterator<Item = DVec3> {
-    let (a, b) = toward.any_orthonormal_pair();
-    (0..6).map(move |k| {
-        let (sin, cos) = (f64::from(k) * std::f64::consts::TAU / 6.0).sin_cos();
-        (toward + (a * cos + b * sin) * angle.tan()).normalize_or(toward)
-    })
 }
 
 /// Averages with the neighbors along both axes: shadows have soft edges.
