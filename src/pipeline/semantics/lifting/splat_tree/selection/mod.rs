@@ -19,8 +19,11 @@ const ADD_BY_CLICK: f64 = 0.1;
 /// Cost of area of a given selection that a line changes, and that a click changes.
 const KNOWN: f64 = 16.0;
 const KNOWN_BY_CLICK: f64 = 0.1;
-/// The same for a click that corrects something known, from the first that is enough.
+/// The same for a click that corrects something known, from the first that is enough, and the largest shares of it that
+/// such a click adds and removes.
 const CORRECTED_BY_CLICK: [f64; 5] = [KNOWN_BY_CLICK, 0.4, 1.6, 6.4, KNOWN];
+const ADDED_BY_CLICK: f64 = 1.0;
+const REMOVED_BY_CLICK: f64 = 0.2;
 
 /// Gaussians that marks select.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -65,8 +68,8 @@ impl Hierarchy {
     }
 
     /// Returns the Gaussians of something known, `from`, as marks correct it. The cost of area rises while a click
-    /// adds more than all of it and more than a click is about, so that a small part does not grow over all around it;
-    /// and while a click removes more than it is about. Of other identities, a mark changes hardly more than it touches.
+    /// changes more than a click is about, adds more than all of the thing, or removes more than a fifth: its place tells
+    /// of no more. What is under it changes at least. Of other identities, a mark changes hardly more than it touches.
     pub(crate) fn correct(&self, marks: &StrokeMarks, from: &[usize], others: &OtherIdentities) -> MarkedSplats {
         self.marked(marks, from, &CORRECTED_BY_CLICK, others)
     }
@@ -89,8 +92,6 @@ struct MarkedLabels<'a> {
     given: Vec<bool>,
     before: Vec<bool>,
     is_given: bool,
-    /// Area of the given selection, square units.
-    known: f64,
     /// Cost of each node for another label than its parent's.
     alone: Vec<f64>,
     /// Costs of the leaves for not following marks, being out and in.
@@ -128,9 +129,7 @@ impl<'a> MarkedLabels<'a> {
         }
         let (marked, now, is_in) = (vec![[0.0; 2]; tree.leaves], before.clone(), given.clone());
         let (is_given, along, left) = (!from.is_empty(), BTreeMap::new(), BTreeMap::new());
-        let mut labels = Self { tree, given, before, is_given, known: 0.0, alone, marked, now, is_in, along, left };
-        labels.known = labels.area(&|leaf| labels.before[leaf]);
-        labels
+        Self { tree, given, before, is_given, alone, marked, now, is_in, along, left }
     }
 
     /// Area of some leaves, square units.
@@ -148,7 +147,7 @@ impl<'a> MarkedLabels<'a> {
     ) -> MarkEffect {
         // A mark of the same kind may take what was left before; what undoes it takes nothing more.
         self.left.retain(|_, is_in| *is_in == stroke.is_plus);
-        let unmarked = stroke.band.is_some().then(|| self.marked.clone());
+        let unmarked = self.marked.clone();
         self.mark(stroke);
         let change = match stroke {
             StrokeMark { is_click, .. } if self.is_given => [if *is_click { by_click[0] } else { KNOWN }; 2],
@@ -159,22 +158,26 @@ impl<'a> MarkedLabels<'a> {
         };
         let mut nodes = self.cheapest(stroke, change);
         let mut is_limited = false;
-        // A click that removes a part of something is not about all of it.
-        let most = if stroke.is_plus { self.known.max(stroke.size) } else { stroke.size };
+        let whole = self.area(&|leaf| self.now[leaf]);
+        let share = if stroke.is_plus { ADDED_BY_CLICK } else { REMOVED_BY_CLICK };
+        let most = if whole > 0.0 { stroke.size.min(share * whole) } else { stroke.size };
         for dearer in by_click[1..].iter().filter(|_| stroke.is_click) {
             if self.area(&|leaf| nodes[leaf] != self.now[leaf]) <= most {
                 break;
             }
             (nodes, is_limited) = (self.cheapest(stroke, [*dearer; 2]), true);
         }
-        let along = self.along(stroke, &nodes);
-        let mut flips = match (&along, unmarked) {
-            (Some(along), Some(unmarked)) => {
+        let mut along = self.along(stroke, &nodes);
+        if is_limited && self.now.iter().zip(&nodes).all(|(now, node)| now == node) {
+            along = Some(stroke.weights.keys().copied().collect());
+        }
+        let mut flips = match &along {
+            Some(along) => {
                 self.marked = unmarked;
                 let flips = along.iter().map(|gaussian| (*gaussian, stroke.is_plus));
                 flips.filter(|(gaussian, is_in)| self.is_in[*gaussian as usize] != *is_in).collect()
             }
-            _ => self.by_leaves(nodes, stroke),
+            None => self.by_leaves(nodes, stroke),
         };
         let (others, stay) = others.spare(&mut flips, &stroke.weights, &self.tree.area);
         self.leave(stay);
@@ -182,7 +185,7 @@ impl<'a> MarkedLabels<'a> {
         // Those that were left to others are not marked.
         let follows = |gaussian: &&u32| self.is_in[**gaussian as usize] == stroke.is_plus;
         self.along.extend(along.iter().flatten().filter(follows).map(|gaussian| (*gaussian, stroke.is_plus)));
-        MarkEffect { is_limited, is_along: along.is_some(), others }
+        MarkEffect { is_limited, is_along: along.is_some() && !stroke.is_click, others }
     }
 
     /// Leaves Gaussians with their labels. A leaf of which nothing else changes has not changed.

@@ -141,17 +141,33 @@ fn a_click_beside_a_small_part_does_not_take_all_around_it() {
 
 #[test]
 fn a_click_that_removes_does_not_take_all_of_something_large() {
-    // A Gaussian without a visible border to twenty others.
-    let (tree, from) = (made(&[1, 20], &[([0, 1], 0.0)]), Vec::from_iter(0..21));
-    let left = |size: f64| {
+    // A Gaussian, and twenty others behind a border.
+    let from = Vec::from_iter(0..21);
+    let left = |size: f64, border: f64| {
+        let tree = made(&[1, 20], &[([0, 1], border)]);
         let marks = StrokeMarks { strokes: vec![StrokeMark { is_plus: false, size, ..click(&[0]) }] };
         let found = tree.correct(&marks, &from, &OtherIdentities::default());
         let of_given = tree.select(&marks, &from).is_in;
         let count = |of: &[bool]| of.iter().filter(|is_in| **is_in).count();
         (count(&found.is_in), found.effect.is_limited, count(&of_given))
     };
-    assert_eq!(left(5.0), (20, true, 0), "the control, of what is only given, loses all");
-    assert_eq!(left(25.0), (0, false, 0), "what is no larger than a click is about goes with it");
+    assert_eq!(left(5.0, 0.0), (20, true, 0), "the control, of what is only given, loses all");
+    assert_eq!(left(25.0, 0.0), (20, true, 0), "a click about more than that is about no more than a piece");
+    assert_eq!(left(25.0, 10.0), (20, false, 20), "the control: a piece behind a border goes at once");
+}
+
+#[test]
+fn a_click_that_may_not_take_a_large_leaf_takes_what_is_under_it() {
+    let (tree, from) = (made(&[10, 50], &[([0, 1], 10.0)]), Vec::from_iter(0..10));
+    let found = |size: f64, from: &[usize]| {
+        let marks = StrokeMarks { strokes: vec![StrokeMark { size, ..click(&[12, 13]) }] };
+        let found = tree.correct(&marks, from, &OtherIdentities::default());
+        let added = (10..60).filter(|i| found.is_in[*i]).collect::<Vec<_>>();
+        (added, found.effect.is_limited, found.effect.is_along)
+    };
+    assert_eq!(found(5.0, &from), (vec![12, 13], true, false));
+    // The control: of nothing, the leaf.
+    assert_eq!(found(100.0, &[]).0.len(), 50);
 }
 
 #[test]
@@ -191,32 +207,32 @@ fn clouds_of_none_of_one_and_of_many_in_one_place() {
 
 #[test]
 fn what_a_click_does_not_touch_stays_with_its_identity() {
-    // Two leaves that hardly differ, and the thing itself, which does. The second leaf is a mouth.
-    let tree = made(&[10, 10, 10], &[([1, 2], 0.1), ([0, 3], 10.0)]);
-    let from: Vec<usize> = (0..10).collect();
-    let of: Vec<IdentityId> = [1, 0, 2].into_iter().flat_map(|id| [id; 10]).collect();
-    let map = SemanticMap::from_identities(Identities::objects(2), of, vec![1.0; 30], Vec::new());
+    // The thing itself, and two leaves that hardly differ, small beside it. The second leaf is a mouth.
+    let tree = made(&[100, 10, 10], &[([1, 2], 0.1), ([0, 3], 10.0)]);
+    let from: Vec<usize> = (0..100).collect();
+    let of: Vec<IdentityId> = (0..120_usize).map(|i| [1, 0, 2][i.saturating_sub(90) / 10]).collect();
+    let map = SemanticMap::from_identities(Identities::objects(2), of, vec![1.0; 120], Vec::new());
     let others = OtherIdentities::new(&map, 1);
     let correct = |strokes: Vec<StrokeMark>, others: &OtherIdentities| {
         let found = tree.correct(&StrokeMarks { strokes }, &from, others);
-        ([0, 10, 20].map(|i| found.is_in[i..i + 10].iter().filter(|s| **s).count()), found.effect.others)
+        ([0..100, 100..110, 110..120].map(|of| found.is_in[of].iter().filter(|s| **s).count()), found.effect.others)
     };
     let mouth = |is_left| vec![OtherChange { id: 2, gaussians: 10, share: 1.0, is_left }];
     // The control: as long as nothing is known of the mouth, it is taken with what is clicked on.
-    assert_eq!(correct(vec![click(&[10, 11])], &OtherIdentities::default()), ([10; 3], Vec::new()));
-    assert_eq!(correct(vec![click(&[10, 11])], &others), ([10, 10, 0], mouth(true)));
+    assert_eq!(correct(vec![click(&[100, 101])], &OtherIdentities::default()), ([100, 10, 10], Vec::new()));
+    assert_eq!(correct(vec![click(&[100, 101])], &others), ([100, 10, 0], mouth(true)));
     // It is taken and told by a click that touches it, also a later one.
-    assert_eq!(correct(vec![click(&[10, 20])], &others), ([10; 3], mouth(false)));
-    assert_eq!(correct(vec![click(&[10, 11]), click(&[25])], &others), ([10; 3], mouth(false)));
-    assert_eq!(correct(vec![click(&[10, 11]), click(&[12])], &others), ([10, 10, 0], mouth(true)));
+    assert_eq!(correct(vec![click(&[100, 110])], &others), ([100, 10, 10], mouth(false)));
+    assert_eq!(correct(vec![click(&[100, 101]), click(&[115])], &others), ([100, 10, 10], mouth(false)));
+    assert_eq!(correct(vec![click(&[100, 101]), click(&[102])], &others), ([100, 10, 0], mouth(true)));
     // A mark that removes takes nothing of what was left, whatever it touches.
     let minus = |on: &[u32]| StrokeMark { is_plus: false, is_click: false, ..click(on) };
-    for on in [&[25][..], &[25, 26, 11], &[3, 25]] {
-        let [own, near, of_mouth] = correct(vec![click(&[10, 11]), minus(on)], &others).0;
-        assert!(of_mouth == 0 && own <= 10 && near <= 10, "{on:?}: {own}, {near}, {of_mouth}");
+    for on in [&[115][..], &[115, 116, 101], &[3, 115]] {
+        let [own, near, of_mouth] = correct(vec![click(&[100, 101]), minus(on)], &others).0;
+        assert!(of_mouth == 0 && own <= 100 && near <= 10, "{on:?}: {own}, {near}, {of_mouth}");
     }
     // What is taken is no change any more.
-    assert_eq!(correct(vec![click(&[10, 20]), click(&[11])], &others), ([10; 3], Vec::new()));
+    assert_eq!(correct(vec![click(&[100, 110]), click(&[101])], &others), ([100, 10, 10], Vec::new()));
 }
 
 #[test]
