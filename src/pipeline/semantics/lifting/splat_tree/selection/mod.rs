@@ -68,9 +68,9 @@ impl Hierarchy {
     }
 
     /// Returns the Gaussians of something known, `from`, as marks correct it. The cost of area rises while a click
-    /// changes more than a click is about, adds more than all of the thing, or removes more than a fifth: its place tells
-    /// of no more. A click that may not change a whole leaf changes what is under it. Of other identities, a mark
-    /// changes hardly more than it touches.
+    /// changes more than a click is about, adds more than all of the thing, or removes more than a fifth: its place
+    /// tells of no more. A click that may not change a whole leaf changes what is under it. Of other identities, a
+    /// mark changes hardly more than it touches.
     pub(crate) fn correct(&self, marks: &StrokeMarks, from: &[usize], others: &OtherIdentities) -> MarkedSplats {
         self.marked(marks, from, &CORRECTED_BY_CLICK, others)
     }
